@@ -52,6 +52,7 @@ server/options     | server/files proto/recording server/events server/hosting s
 server/program     | server/agones server/events server/fleet proto/recording proto/text server/options server/identity server/tls server/discovery server/doctor server/endpoint server/monitoring server/hosting server/saved_state server/recording server/step server/simulation server/messages server/model server/vulkan
 server/main.cpp    | proto/text server/program server/options server/telemetry
 clients/core       | proto/codec proto/parameters
+clients/core/body  | clients/core/core.h clients/core/wire
 clients/core/datagrams | clients/core/core.h clients/core/wire proto/codec proto/datagram
 clients/core/stream | clients/core/core.h clients/core/wire proto/codec
 clients/core/touch | clients/core/core.h clients/core/wire proto/codec proto/hands

@@ -60,6 +60,8 @@ const char* nameOf(const cs_presence& presence) {
       return "participantDisconnected";
     case CS_PRESENCE_RETURNED:
       return "participantReturned";
+    case CS_PRESENCE_BODY_CHANGED:
+      return "bodyChanged";
     default:
       return "presence";
   }
@@ -69,6 +71,7 @@ std::string presenceLine(const cs_client* client, const cs_presence& presence,
                          const cs_participant& participant) {
   Json object = event(client, nameOf(presence));
   object["participant"] = participantOf(participant);
+  if (presence.kind == CS_PRESENCE_BODY_CHANGED) object["body"] = cs_body_of(client, participant.id);
   if (presence.by != 0) object["by"] = presence.by;
   return lineOf(object);
 }

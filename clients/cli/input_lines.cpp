@@ -187,8 +187,47 @@ InputLine::Joints jointsOf(const Json& object, const std::string& where) {
   return joints;
 }
 
+// Copies a pose of body tracking: position, and the orientation if `to` has room for one.
+template <std::size_t n>
+void readTracked(const Json& object, const char* key, std::uint32_t part, cs_tracked_body& body,
+                 float (&to)[n]) {
+  if (!object.contains(key) || object[key].is_null()) return;
+  const std::string where = std::string("body.") + key;
+  if constexpr (n == 3) {
+    const auto position = numbers<3>(object[key], where);
+    std::copy(position.begin(), position.end(), to);
+  } else {
+    allowOnly(object[key], where, {"position", "orientation"});
+    const auto position = positionOf(object[key], where);
+    const auto orientation = orientationOf(object[key], where).value_or(std::array<float, 4>{0, 0, 0, 1});
+    std::copy(position.begin(), position.end(), to);
+    std::copy(orientation.begin(), orientation.end(), to + 3);
+  }
+  body.parts |= part;
+}
+
+cs_tracked_body bodyOf(const Json& object) {
+  allowOnly(object, "body",
+            {"head", "leftHand", "rightHand", "hips", "leftElbow", "rightElbow", "leftAnkle", "rightAnkle",
+             "floor"});
+  cs_tracked_body body{};
+  body.version = CS_TRACKED_BODY_VERSION;
+  readTracked(object, "head", CS_BODY_HEAD, body, body.head);
+  if (body.parts == 0) throw Wrong("body has no \"head\"");
+  readTracked(object, "leftHand", CS_BODY_LEFT_HAND, body, body.left_hand);
+  readTracked(object, "rightHand", CS_BODY_RIGHT_HAND, body, body.right_hand);
+  readTracked(object, "hips", CS_BODY_HIPS, body, body.hips);
+  readTracked(object, "leftElbow", CS_BODY_LEFT_ELBOW, body, body.left_elbow);
+  readTracked(object, "rightElbow", CS_BODY_RIGHT_ELBOW, body, body.right_elbow);
+  readTracked(object, "leftAnkle", CS_BODY_LEFT_ANKLE, body, body.left_ankle);
+  readTracked(object, "rightAnkle", CS_BODY_RIGHT_ANKLE, body, body.right_ankle);
+  body.floor = number(object, "floor", "body", 0);
+  return body;
+}
+
 InputLine lineOf(const Json& object) {
-  allowOnly(object, "a line", {"after", "colliders", "grabs", "head", "hands", "attachments", "joints"});
+  allowOnly(object, "a line",
+            {"after", "colliders", "grabs", "head", "hands", "attachments", "joints", "wear", "body"});
   InputLine line;
   if (object.contains("after")) {
     line.after = static_cast<double>(number(object["after"], "after"));
@@ -230,12 +269,27 @@ InputLine lineOf(const Json& object) {
       line.joints.push_back(jointsOf(joints, where));
     });
   }
+  if (object.contains("wear")) {
+    if (!object["wear"].is_string() && !object["wear"].is_null())
+      throw Wrong("wear must be the name of a collider, or null, which gives the body back");
+    line.wear = object["wear"].is_null() ? "" : object["wear"].get<std::string>();
+  }
+  if (object.contains("body")) line.body = bodyOf(object["body"]);
   return line;
+}
+
+// Names of the colliders that can be worn.
+std::string bodiesOf(const cs_client* client) {
+  std::vector<std::string> names;
+  cs_collider collider;
+  for (std::uint32_t i = 0; cs_get_collider(client, i, &collider) != 0; ++i)
+    if (cs_is_body(client, i) != 0) names.emplace_back(collider.name);
+  return names.empty() ? "this scene has no bodies" : fmt::format("use {}", fmt::join(names, ", "));
 }
 
 }  // namespace
 
-void InputLine::send(cs_client* client, std::uint64_t nowUs) const {
+tl::expected<void, std::string> InputLine::send(cs_client* client, std::uint64_t nowUs) const {
   if (colliders)
     cs_set_colliders(client, colliders->data(), static_cast<std::uint32_t>(colliders->size()), nowUs);
   if (grabs) cs_set_grabs(client, grabs->data(), static_cast<std::uint32_t>(grabs->size()), nowUs);
@@ -255,6 +309,10 @@ void InputLine::send(cs_client* client, std::uint64_t nowUs) const {
   for (const Joints& moved : joints)
     cs_move_joints(client, moved.collider.c_str(), moved.poses.data(),
                    static_cast<std::uint32_t>(moved.poses.size() / 7), moved.jumps ? 1 : 0, nowUs);
+  if (wear && cs_wear(client, wear->c_str()) == 0)
+    return tl::unexpected(
+        fmt::format("wear: \"{}\" is not a body of the scene; {}", *wear, bodiesOf(client)));
+  return {};
 }
 
 tl::expected<InputLine, std::string> parseInputLine(std::string_view line) {
@@ -307,6 +365,10 @@ std::optional<std::string> InputLines::takeLine() {
   text_.erase(0, end == std::string::npos ? end : end + 1);
   ++number_;
   return line;
+}
+
+std::string InputLines::place() const {
+  return fmt::format("{}, line {}", path_, number_);
 }
 
 tl::expected<std::optional<InputLine>, std::string> InputLines::next(

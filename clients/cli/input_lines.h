@@ -48,8 +48,11 @@ struct InputLine {
   std::vector<Hand> hands;
   std::vector<Attachment> attachments;
   std::vector<Joints> joints;
+  std::optional<std::string> wear;  // collider to take as the body; empty gives it back
+  std::optional<cs_tracked_body> body;
 
-  void send(cs_client* client, std::uint64_t nowUs) const;
+  // If `wear` is not a body, the error names the bodies of the scene.
+  [[nodiscard]] tl::expected<void, std::string> send(cs_client* client, std::uint64_t nowUs) const;
 };
 
 // The error names the part of the line that is wrong, and what is allowed.
@@ -69,6 +72,8 @@ class InputLines {
       std::chrono::steady_clock::time_point now);
   // Whether all lines were returned.
   bool atEnd() const { return ended_ && !waiting_ && text_.empty(); }
+  // Path and number of the newest line, for errors.
+  std::string place() const;
 
  private:
   InputLines(int file, std::string path) : file_(file), path_(std::move(path)) {}

@@ -96,15 +96,40 @@ void sendInput(NativeClient& client, const JoinOptions& options) {
   });
 }
 
-// Sends the lines of input whose time has come.
-tl::expected<void, Error> sendLines(NativeClient& client, InputLines& input) {
-  for (;;) {
-    const auto line = input.next(SteadyClock::now());
-    if (!line) return tl::unexpected(Error{kUnreadable, line.error()});
-    if (!*line) return {};
-    client.visit([&](cs_client* core) { (*line)->send(core, NativeClient::nowUs()); });
+// Lines of input, and the body that they move. It moves between two lines as well: its arms and feet follow.
+class Input {
+ public:
+  explicit Input(InputLines lines) : lines_(std::move(lines)) {}
+
+  // Sends the lines whose time has come, and the body about 90 times in a second.
+  tl::expected<void, Error> send(NativeClient& client) {
+    tl::expected<void, Error> sent;
+    for (;;) {
+      const auto line = lines_.next(SteadyClock::now());
+      if (!line) return tl::unexpected(Error{kUnreadable, line.error()});
+      if (!*line) break;
+      client.visit([&](cs_client* core) {
+        if (auto done = (*line)->send(core, NativeClient::nowUs()); !done)
+          sent = tl::unexpected(Error{kUnreadable, fmt::format("{}: {}", lines_.place(), done.error())});
+      });
+      if (!sent) return sent;
+      if ((*line)->body) body_ = (*line)->body;
+    }
+    if (!body_ || SteadyClock::now() < nextBody_) return sent;
+    nextBody_ = SteadyClock::now() + kBodyInterval;
+    client.visit([&](cs_client* core) { cs_set_body(core, &*body_, NativeClient::nowUs()); });
+    return sent;
   }
-}
+  // Whether nothing is left to send.
+  bool atEnd() const { return lines_.atEnd() && !body_; }
+
+ private:
+  static constexpr std::chrono::milliseconds kBodyInterval{11};
+
+  InputLines lines_;
+  std::optional<cs_tracked_body> body_;
+  SteadyClock::time_point nextBody_;
+};
 
 Report reportOf(NativeClient& client) {
   Report report;
@@ -115,13 +140,13 @@ Report reportOf(NativeClient& client) {
 
 // Waits for the end of the time, a signal or the end of the stream. Returns an error if the stream ended, or
 // the input is wrong.
-std::optional<Error> follow(NativeClient& client, const JoinOptions& options, InputLines* input,
+std::optional<Error> follow(NativeClient& client, const JoinOptions& options, Input* input,
                             const StatusLine& line) {
   StreamTime time(options.seconds);
   auto nextLine = SteadyClock::now();  // of the terminal
   for (;;) {
     if (input != nullptr)
-      if (auto sent = sendLines(client, *input); !sent) return std::move(sent).error();
+      if (auto sent = input->send(client); !sent) return std::move(sent).error();
     const auto wait = time.next(input != nullptr && !input->atEnd() ? kInputInterval : kLineInterval,
                                 reportOf(client).statistics.frames);
     if (!wait || interrupted(*wait)) return std::nullopt;
@@ -142,7 +167,7 @@ ExitCode join(const JoinOptions& options) {
     if (!created) return printError(kNotWritten, created.error());
     obj.emplace(std::move(*created));
   }
-  std::optional<InputLines> input;
+  std::optional<Input> input;
   if (!options.inputPath.empty()) {
     auto opened = InputLines::open(options.inputPath);
     if (!opened) return printError(kUnreadable, opened.error());

@@ -60,6 +60,10 @@ std::string text(const cs_client* client, const cs_presence& presence, const cs_
       return name + " was disconnected";
     case CS_PRESENCE_RETURNED:
       return name + " has returned";
+    case CS_PRESENCE_BODY_CHANGED: {
+      const char* const body = cs_body_of(client, participant.id);
+      return *body == '\0' ? name + " wears no body any more" : fmt::format("{} wears {}", name, body);
+    }
     default:
       return fmt::format("{}: an event that this client does not know", name);
   }

@@ -203,6 +203,8 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   if (returned && !resumed_) clock_ = {};
   // The colliders and grabs of an earlier client end, even if this one has none yet.
   if (inherited || (returned && posed_)) sendPoses(nowUs);
+  // A server that has forgotten this participant has given its body back.
+  if (returned && worn_ && participants_.bodyOf(welcome_.participantId) != worn_->collider()) sendWearing();
   const std::uint32_t events =
       (participants_.all().empty() ? 0u : std::uint32_t{CS_EVENT_PARTICIPANTS}) | sendSurfaces(resumed_);
   if (!known) return events;
@@ -240,6 +242,8 @@ std::uint32_t Client::presenceReceived(Bytes body, std::uint64_t nowUs) {
     if (std::exchange(welcome_.role, who.role) == CS_ROLE_VIEWER) sendSurfaces(false);
     if (posed_) sendPoses(nowUs);
   }
+  if (who.id == welcome_.participantId && worn_) worn_->announced(who.body);
+  if (worn_ && worn_->isLost()) worn_.reset();
   return CS_EVENT_PARTICIPANTS | CS_EVENT_PRESENCE;
 }
 
@@ -254,6 +258,7 @@ std::uint32_t Client::chunkReceived(Bytes body) {
 
 std::uint32_t Client::described() {
   display_.begin(stream_.description());
+  checkWorn();
   hello_.contentId = welcome_.contentId;
   const bool returned = state_ == CS_STATE_RECONNECTING;
   state_ = CS_STATE_JOINED;
@@ -337,6 +342,7 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId, std::ui
   std::optional<ServerError> error = readError(body);
   if (!error) return failMalformed("Error");
   if (!error->fatal) {
+    if (requestId != 0 && requestId == wearRequest_) wearingRefused();
     if (datagrams_.refused(requestId)) return CS_EVENT_DATAGRAMS;
     // Pieces that were under way when the server refused an upload are refused as well.
     if (requests_.isOfEndedUpload(requestId)) return 0;

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/core/body/worn_body.h"
 #include "clients/core/core.h"
 #include "clients/core/display.h"
 #include "clients/core/stream/connection_timer.h"
@@ -73,6 +74,11 @@ class Client {
   void wantConstraints(bool wants, std::uint64_t nowUs);
   void move(AttachmentPose attachment, std::uint64_t nowUs);
   void move(ColliderJoints joints, std::uint64_t nowUs);
+  // Takes the collider with this name as the own body, or gives the own one back for an empty name. Returns
+  // false if it is not a human body.
+  bool wear(std::string_view collider);
+  // Returns false without a body.
+  bool moveBody(const body::Tracked& tracked, std::uint64_t nowUs);
   // Returns false if the server of the scene takes no surfaces.
   bool setSurface(OwnSurface surface);
   OwnSurfaces& surfaces() { return surfaces_; }
@@ -137,8 +143,17 @@ class Client {
   const std::vector<cs_grab_event>& grabEvents() const { return events_.grabs; }
   const std::vector<ContactEvent>& contactEvents() const { return events_.contacts; }
   const std::vector<Collider>& colliders() const { return stream_.description().colliders; }
+  // nullptr if this client wears no body.
+  const body::WornBody* worn() const { return worn_ ? &*worn_ : nullptr; }
 
  private:
+  // Skeleton of the collider of the scene with this name; nullopt if it is not a human body.
+  std::optional<body::Humanoid> humanoidOf(std::string_view collider) const;
+  void sendWearing();
+  // The participant keeps the body that it had before.
+  void wearingRefused();
+  // Drops the own body if the server has given it back, or the description does not have it any more.
+  void checkWorn();
   void sendPoses(std::uint64_t nowUs);
   // Tick of the frame that is shown; 0 before the first.
   std::uint64_t shownTick() const;
@@ -198,6 +213,8 @@ class Client {
   Outbox outbox_;
   Poses poses_;         // poses of this participant
   bool posed_ = false;  // whether the program has set a pose
+  std::optional<body::WornBody> worn_;
+  std::uint64_t wearRequest_ = 0;  // newest one for a body
   OwnSurfaces surfaces_;
   Display display_;
   std::vector<SceneSummary> scenes_;

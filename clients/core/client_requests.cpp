@@ -102,6 +102,72 @@ void Client::move(ColliderJoints joints, std::uint64_t nowUs) {
   sendPoses(nowUs);
 }
 
+bool Client::wear(std::string_view collider) {
+  if (collider.empty()) {
+    // The body may also be of an earlier client of this participant.
+    const bool wears = worn_.has_value() || !participants_.bodyOf(welcome_.participantId).empty();
+    worn_.reset();
+    if (wears) sendWearing();
+    return true;
+  }
+  if (worn_ && worn_->collider() == collider) return true;
+  std::optional<body::Humanoid> humanoid = humanoidOf(collider);
+  if (!humanoid) return false;
+  worn_.emplace(std::string(collider), std::move(*humanoid));
+  sendWearing();
+  return true;
+}
+
+std::optional<body::Humanoid> Client::humanoidOf(std::string_view collider) const {
+  const auto& hulls = stream_.description().hulls;
+  const auto found = hulls.find(std::string(collider));
+  if (state_ != CS_STATE_JOINED || found == hulls.end()) return std::nullopt;
+  return body::findHumanoid(found->second);
+}
+
+void Client::sendWearing() {
+  std::optional<StandingBody> standing;
+  if (worn_)
+    for (const Collider& collider : colliders())
+      if (collider.participantId == 0 && collider.name == worn_->collider())
+        standing = {
+            .collider = collider.name, .position = collider.position, .orientation = collider.orientation};
+  wearRequest_ = requests_.nextId();
+  std::string message;
+  writeWearBody(message, wearRequest_, standing);
+  send(std::move(message));
+}
+
+void Client::wearingRefused() {
+  wearRequest_ = 0;
+  worn_.reset();
+  const std::string& own = participants_.bodyOf(welcome_.participantId);
+  std::optional<body::Humanoid> humanoid = humanoidOf(own);
+  if (!humanoid) return;
+  worn_.emplace(own, std::move(*humanoid));
+  worn_->announced(own);
+}
+
+void Client::checkWorn() {
+  if (!worn_) return;
+  const auto found = stream_.description().hulls.find(worn_->collider());
+  if (found == stream_.description().hulls.end() || !worn_->fits(found->second)) {
+    worn_.reset();
+    sendWearing();
+  }
+}
+
+bool Client::moveBody(const body::Tracked& tracked, std::uint64_t nowUs) {
+  if (!worn_) return false;
+  const auto collider = std::find_if(colliders().begin(), colliders().end(), [&](const Collider& one) {
+    return one.participantId == 0 && one.name == worn_->collider();
+  });
+  if (collider == colliders().end()) return false;
+  const bool jumps = worn_->update(tracked, *collider, nowUs);
+  move({.collider = worn_->collider(), .poses = worn_->poses(), .jumps = jumps}, nowUs);
+  return true;
+}
+
 bool Client::setSurface(OwnSurface surface) {
   if (timer_.isWelcomed() && welcome_.surfacePolicy != CS_SURFACES_OWN) return false;
   surfaces_.set(std::move(surface));

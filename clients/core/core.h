@@ -708,6 +708,59 @@ void cs_move_attachment(cs_client* client, const char* attachment, const float* 
 void cs_move_joints(cs_client* client, const char* collider, const float* poses, uint32_t count, int jumps,
                     uint64_t now_us) CS_NOEXCEPT;
 
+/* Parts of a body that are tracked. Left and right are those of the person. */
+typedef enum cs_body_part {
+  CS_BODY_HEAD = 1,
+  CS_BODY_LEFT_HAND = 2,
+  CS_BODY_RIGHT_HAND = 4,
+  CS_BODY_HIPS = 8,
+  CS_BODY_LEFT_ELBOW = 16,
+  CS_BODY_RIGHT_ELBOW = 32,
+  CS_BODY_LEFT_ANKLE = 64,
+  CS_BODY_RIGHT_ANKLE = 128
+} cs_body_part;
+
+#define CS_TRACKED_BODY_VERSION 1u
+/* What is known of a person, in the scene, whose +Y is up. Poses are position (m) and quaternion x y z w. */
+typedef struct cs_tracked_body {
+  uint32_t version CS_INIT(CS_TRACKED_BODY_VERSION);
+  uint32_t
+      parts;   /* sum of the cs_body_part that are tracked; CS_BODY_HEAD is required, others have no effect */
+  float floor; /* height of the floor, m */
+  float head[7]; /* between the eyes; looks along -Z */
+  /* Wrists: the fingers point along -Z, and the back of the hand to +Y, as WebXR and OpenXR have it. */
+  float left_hand[7], right_hand[7];
+  /* Joints of body tracking, m. */
+  float hips[3], left_elbow[3], right_elbow[3], left_ankle[3], right_ankle[3];
+} cs_tracked_body;
+
+/* Returns 1 if the collider with this index is a human body that can be worn: a mesh with joints whose names
+ * say hips, head, arms and forearms (docs/bodies.md); else 0. Servers that do not know bodies send no names
+ * of joints. */
+int cs_is_body(const cs_client* client, uint32_t collider) CS_NOEXCEPT;
+/* Takes a collider of the scene as the body of this participant, and gives back the one that it has; NULL or
+ * "" only gives back. The body stands where it is shown now. CS_EVENT_PRESENCE announces the result to
+ * everyone. If the server refuses, because another participant wears the body for example, CS_EVENT_ERROR
+ * follows, and this participant keeps the body that it had. Fails, and sends nothing, if there is no such
+ * body. */
+int cs_wear(cs_client* client, const char* collider) CS_NOEXCEPT;
+/* Name of the collider that a participant wears; "" for none. */
+const char* cs_body_of(const cs_client* client, uint64_t participant_id) CS_NOEXCEPT;
+/* Bends the body that this client wears to a person, and sends its joints. Call it once for each displayed
+ * frame. It jumps if it is the first call, or the head has moved by more than 1 m. Fails, and changes
+ * nothing, without a body or a tracked head, if a number is not finite, or for an unknown version. */
+int cs_set_body(cs_client* client, const cs_tracked_body* tracked, uint64_t now_us) CS_NOEXCEPT;
+/* Where the newest cs_set_body has put a cs_body_part: position and quaternion x y z w. A wrist that is
+ * nearer to the tracked one than 2 cm is within the reach of the arm. Fails before, or if the body has no
+ * such part. */
+int cs_get_body_part(const cs_client* client, uint32_t part, float* pose7) CS_NOEXCEPT;
+/* Poses of all joints that the newest cs_set_body has sent, as in cs_move_joints; NULL and 0 before. */
+const float* cs_body_joints(const cs_client* client, uint32_t* count) CS_NOEXCEPT;
+/* Corners of the triangles of a body (cs_get_hull) that its neck and head do not move, for the view out of
+ * the head. NULL and 0 if it is not a body. Valid until the next call. */
+const uint32_t* cs_body_below_neck(const cs_client* client, uint32_t collider,
+                                   uint32_t* index_count) CS_NOEXCEPT;
+
 /* Returns the policy of the server for surfaces of the real room, from the newest Welcome. */
 cs_surface_policy cs_get_surface_policy(const cs_client* client) CS_NOEXCEPT;
 /* Adds a surface of the real room, or replaces the one with its id. The mesh is copied, and sent again after
@@ -853,7 +906,8 @@ typedef enum cs_presence_kind {
   CS_PRESENCE_LEFT = 2,
   CS_PRESENCE_ROLE_CHANGED = 3,
   CS_PRESENCE_DISCONNECTED = 4,
-  CS_PRESENCE_RETURNED = 5
+  CS_PRESENCE_RETURNED = 5,
+  CS_PRESENCE_BODY_CHANGED = 6 /* the participant wears another body, or none */
 } cs_presence_kind;
 
 /* LeaveReason of session.proto. */

@@ -13,8 +13,9 @@
 
 struct cs_client {
   clothstream::client::Client client;
-  std::string resumeToken{};           // text that cs_resume_token has returned
-  mutable std::vector<float> posed{};  // vertices that cs_get_hull has returned
+  std::string resumeToken{};                       // text that cs_resume_token has returned
+  mutable std::vector<float> posed{};              // vertices that cs_get_hull has returned
+  mutable std::vector<std::uint32_t> belowNeck{};  // corners that cs_body_below_neck has returned
 };
 
 namespace clothstream::client {

@@ -115,6 +115,18 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
   }
 }
 
+// Returns nullptr after a failed check if the scene has no such collider, or it has no joints.
+const model::Collider* findWithJoints(Checks& checks, const Path& path, const std::string& name,
+                                      const model::Scene& scene) {
+  checkKnown(checks, path, name, scene.colliders);
+  if (checks.failed()) return nullptr;
+  const auto found = std::ranges::find(scene.colliders, name, &model::Collider::name);
+  const auto* solid = std::get_if<model::Solid>(&found->shape);
+  if (solid != nullptr && (*solid)->skin) return &*found;
+  checks.fail(path, '"' + name + '"', "has no joints");
+  return nullptr;
+}
+
 // Cloth that follows joints out of the stream's range would roll the scene back for everyone. The bound is
 // that of a sphere around the collider, which may be anywhere on its way.
 void checkJointReach(Checks& checks, const Path& path, const model::Collider& collider,
@@ -151,17 +163,11 @@ void readJoints(Checks& checks, const Path& poses, const v1::ColliderPoses& mess
   for (int i = 0; i < message.joints_size() && !checks.failed(); ++i) {
     const v1::ColliderJoints& from = message.joints(i);
     const Path path = poses.at("joints", i);
-    checkKnown(checks, path / "collider", from.collider(), scene.colliders);
-    if (checks.failed()) return;
-    const auto found = std::ranges::find(scene.colliders, from.collider(), &model::Collider::name);
-    const auto* solid = std::get_if<model::Solid>(&found->shape);
-    if (solid == nullptr || !(*solid)->skin) {
-      checks.fail(path / "collider", '"' + from.collider() + '"', "has no joints");
-      return;
-    }
-    to.joints.push_back({static_cast<std::size_t>(found - scene.colliders.begin()),
-                         toJoints(checks, path / "joints", from.joints(), (*solid)->skin->joints.size()),
-                         from.jumps()});
+    const model::Collider* const found = findWithJoints(checks, path / "collider", from.collider(), scene);
+    if (found == nullptr) return;
+    const model::Skin& skin = *std::get<model::Solid>(found->shape)->skin;
+    to.joints.push_back({static_cast<std::size_t>(found - scene.colliders.data()),
+                         toJoints(checks, path / "joints", from.joints(), skin.joints.size()), from.jumps()});
     checkJointReach(checks, path, *found, to.joints.back(), scene);
   }
 }
@@ -212,6 +218,28 @@ Result<Joining> toJoining(const v1::Hello& message, std::span<const std::uint32_
                  visible(message.display_name()),
                  message.role(),
                  static_cast<std::uint8_t>(message.quality())};
+}
+
+Result<v1::ParameterChange> toWornBody(const v1::WearBody& message, const model::Scene& scene) {
+  v1::ParameterChange change;
+  if (message.collider().empty()) return change;
+  Checks checks;
+  const Path path("wearBody");
+  findWithJoints(checks, path / "collider", message.collider(), scene);
+  if (message.has_stands()) {
+    const model::Pose stands = toPose(checks, path / "stands", message.stands());
+    // As for attachments: cloth that follows the body must stay in the stream's range.
+    const double reach = model::reachOf(scene.stream);
+    const model::Vec3 origin = model::originOf(scene);
+    for (int axis = 0; axis < 3; ++axis)
+      checks.number(path / "stands", stands.position[axis],
+                    {.min = origin[axis] - reach, .max = origin[axis] + reach});
+    v1::ColliderChange& collider = *change.add_colliders();
+    collider.set_name(message.collider());
+    write(stands.position, *collider.mutable_position());
+    write(stands.orientation, *collider.mutable_orientation());
+  }
+  return std::move(checks).result(std::move(change));
 }
 
 Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message, const model::Scene& scene) {

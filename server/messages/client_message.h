@@ -41,6 +41,10 @@ struct Joining {
 [[nodiscard]] Result<model::ParticipantPoses> toPoses(const v1::ColliderPoses& message,
                                                       const model::Scene& scene);
 
+// Change that stops the collider of a body that a participant takes; empty if it keeps its motion, and if the
+// participant gives its body back.
+[[nodiscard]] Result<v1::ParameterChange> toWornBody(const v1::WearBody& message, const model::Scene& scene);
+
 // Refuses a change that cannot be applied to this scene as a whole: if a name does not exist, a value is out
 // of range, or the scene would be unstable with its substeps. `bound` is of this scene before any change.
 [[nodiscard]] Result<model::ParameterChange> toParameterChange(const v1::ParameterChange& message,

@@ -191,6 +191,10 @@ void write(const model::ClosedMesh& mesh, v1::ColliderMeshDescription& message) 
                                       sizeof vertex.weights);
   }
   writeJoints(*mesh.skin, model::restJoints(*mesh.skin), *message.mutable_rest());
+  for (const model::Joint& joint : mesh.skin->joints) {
+    message.add_joint_names(joint.name);
+    message.add_joint_parents(joint.parent ? *joint.parent + 1 : 0);
+  }
 }
 
 std::size_t geometryBytes(const model::ClosedMesh& mesh) {

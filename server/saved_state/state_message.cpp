@@ -254,6 +254,7 @@ v1::SavedSession toMessage(const scene::SavedRoster& roster, const v1::Scene& pa
     to.set_tenant(saved.subject.tenant);
     to.set_granted_role(saved.grantedRole);
     to.set_owns_by_token(saved.ownsByToken);
+    to.set_body(saved.participant.body);
   }
   for (const scene::Ban& ban : roster.bans) {
     v1::SavedBan& to = *message.add_bans();
@@ -273,7 +274,8 @@ scene::SavedRoster toRoster(const v1::SavedSession& message) {
                                                      .displayName = from.display_name(),
                                                      .clientName = from.client_name(),
                                                      .role = scene::fromMessage(from.role()),
-                                                     .away = true},
+                                                     .away = true,
+                                                     .body = from.body()},
                                      .tokenHash = from.token_hash(),
                                      .subject = {.tenant = from.tenant(), .name = from.subject()},
                                      .attempt = from.attempt(),

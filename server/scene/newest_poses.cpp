@@ -53,6 +53,11 @@ void NewestPoses::setRole(std::uint64_t participant, Role role, Clock::time_poin
   }
 }
 
+void NewestPoses::setBody(std::uint64_t participant, const std::string& body) {
+  const std::lock_guard lock(mutex_);
+  if (const auto entry = find(participant); entry != entries_.end()) entry->body = body;
+}
+
 void NewestPoses::withdraw(std::uint64_t participant, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   if (const auto entry = find(participant); entry != entries_.end()) removeFromScene(*entry, now);
@@ -95,10 +100,14 @@ messages::Result<void> NewestPoses::post(const delivery::Mailbox& mailbox, const
   if (entry == entries_.end()) return {};
   if (auto permitted = permit(entry->role, message, permissions); !permitted) return permitted;
   messages::Result<void> joints;
+  if (!poses.joints.empty()) {
+    joints = limitJoints(*entry, message, poses);
+    if (std::exchange(entry->bodyRefused, !joints)) joints = {};  // it has the error already
+  }
   if (budget_ != nullptr && !poses.joints.empty()) {
-    joints = budget_->chargeJoints();
-    if (!joints) poses.joints.clear();
-    if (std::exchange(entry->jointsRefused, !joints)) joints = {};  // it has the error already
+    messages::Result<void> charged = budget_->chargeJoints();
+    if (!charged) poses.joints.clear();
+    if (!std::exchange(entry->jointsRefused, !charged) && !charged) joints = std::move(charged);
   }
   entry->posed = true;
   entry->poses = {.colliders = poses.colliders,
@@ -188,6 +197,24 @@ void NewestPoses::limit(Entry& entry, std::vector<model::ParticipantCollider>& c
     if (uses != std::exchange(entry.uses, uses)) charge();
   }
   entry.acting = colliders.size();
+}
+
+messages::Result<void> NewestPoses::limitJoints(const Entry& entry, const v1::ColliderPoses& message,
+                                                model::ParticipantPoses& poses) const {
+  messages::Result<void> limited;
+  for (std::size_t i = poses.joints.size(); i-- > 0;) {
+    const std::string& collider = message.joints(static_cast<int>(i)).collider();
+    const auto wearer = std::ranges::find(entries_, collider, &Entry::body);
+    if (wearer == entries_.end() || wearer->participant == entry.participant) continue;
+    poses.joints.erase(poses.joints.begin() + static_cast<std::ptrdiff_t>(i));
+    limited = tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_PERMISSION_DENIED,
+        fmt::format(
+            "colliderPoses.joints[{}].collider = \"{}\": participant {} wears it, so only that participant "
+            "moves it; move another one, or wait until it is given back",
+            i, collider, wearer->participant)});
+  }
+  return limited;
 }
 
 messages::Result<void> NewestPoses::limitWinds(Entry& entry, std::vector<model::HeldWind>& winds) {

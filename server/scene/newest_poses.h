@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "server/delivery/subscribers.h"
@@ -44,6 +45,9 @@ class NewestPoses {
   // A viewer's poses are removed and forgotten. A lower role loses its winds, and sends them again if it may
   // still hold some.
   void setRole(std::uint64_t participant, Role role, Clock::time_point now);
+  // Name of the collider that the participant wears; empty for none. Joints of it in poses of others do not
+  // act.
+  void setBody(std::uint64_t participant, const std::string& body);
   // Removes the participant's poses from the scene until resume() puts its colliders, grabs and winds back.
   void withdraw(std::uint64_t participant, Clock::time_point now);
   void resume(std::uint64_t participant, Clock::time_point now);
@@ -55,7 +59,7 @@ class NewestPoses {
   // Puts the poses of the mailbox's participant into the inbox; without a participant it does nothing.
   // `poses` is the content of `message`. Returns an error if the role is too low. Another error says so when
   // colliders begin to exceed the participant's share, when winds begin to exceed the room, or when the
-  // budget begins to refuse its joints.
+  // budget begins to refuse its joints, or when they begin to be of a body that another participant wears.
   [[nodiscard]] messages::Result<void> post(const delivery::Mailbox& mailbox,
                                             const v1::ColliderPoses& message, model::ParticipantPoses poses,
                                             const Permissions& permissions, Clock::time_point arrival);
@@ -68,12 +72,14 @@ class NewestPoses {
   struct Entry {
     std::uint64_t participant = 0;
     Role role = Role::none;
+    std::string body;               // name of the collider that it wears
     bool posed = false;             // the scene may have colliders, grabs or winds of it
     model::ParticipantPoses poses;  // the newest, without attachments and joints
     ColliderLoad needs, uses;       // of the colliders in `poses`, while posed
     std::size_t acting = 0;         // number of them that the scene has
     bool collidersLimited = false;  // the newest message had more
     bool jointsRefused = false;     // joints of the newest message that had some
+    bool bodyRefused = false;       // likewise, because another participant wears their body
     std::size_t winds = 0;          // number of its winds that the scene has
     bool windsRefused = false;      // the newest message had more
   };
@@ -88,6 +94,10 @@ class NewestPoses {
   ColliderLoad shareOfEach() const;
   // Removes colliders beyond the participant's share, and charges the others.
   void limit(Entry& entry, std::vector<model::ParticipantCollider>& colliders);
+  // Removes joints of bodies that other participants wear, and returns why. `poses` is the content of
+  // `message`.
+  messages::Result<void> limitJoints(const Entry& entry, const v1::ColliderPoses& message,
+                                     model::ParticipantPoses& poses) const;
   // Removes winds beyond the room, charges the others, and returns why it removed some.
   messages::Result<void> limitWinds(Entry& entry, std::vector<model::HeldWind>& winds);
   void charge();

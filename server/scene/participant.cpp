@@ -11,6 +11,7 @@ void write(const Participant& participant, v1::Participant& message) {
   message.set_client_name(participant.clientName);
   message.set_role(toMessage(participant.role));
   message.set_away(participant.away);
+  message.set_body(participant.body);
 }
 
 SavedParticipant toSaved(const ParticipantRecord& record) {

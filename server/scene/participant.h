@@ -20,6 +20,7 @@ struct Participant {
   std::string displayName, clientName;
   Role role = Role::none;
   bool away = false;  // disconnected; it may come back
+  std::string body{};  // name of the collider that it wears; empty for none
 };
 void write(const Participant& participant, v1::Participant& message);
 

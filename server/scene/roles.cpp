@@ -18,6 +18,8 @@ const char* nameOf(Action action) {
       return "colliderPoses.grabs";
     case Action::moveAttachments:
       return "colliderPoses: attachments and joints";
+    case Action::wear:
+      return "wearBody";
     case Action::holdWinds:
       return "colliderPoses.winds";
     case Action::placeSurfaces:
@@ -54,6 +56,7 @@ Role roleFor(Action action, const Permissions& participants) {
     case Action::collide:
     case Action::grab:
     case Action::moveAttachments:
+    case Action::wear:
     case Action::placeSurfaces:
       return Role::participant;
     case Action::holdWinds:

@@ -16,6 +16,7 @@ enum class Action : std::uint8_t {
   collide,
   grab,
   moveAttachments,
+  wear,  // a body
   holdWinds,
   placeSurfaces,  // of the real room
   changeEnvironment,

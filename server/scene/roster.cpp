@@ -121,6 +121,10 @@ void Roster::limitRole(ParticipantRecord& record, const Rights& rights, Clock::t
 void Roster::changeRole(ParticipantRecord& record, Role role, std::uint64_t by, Clock::time_point now) {
   record.participant.role = role;
   poses_.setRole(record.id(), role, now);
+  if (role == Role::viewer) {
+    record.participant.body.clear();
+    poses_.setBody(record.id(), {});
+  }
   subscribers_.announce(presenceMessage(v1::PRESENCE_KIND_ROLE_CHANGED, record.participant, by));
 }
 
@@ -228,6 +232,7 @@ void Roster::restore(const SavedRoster& from, const ReconnectGrace& grace, Clock
     ParticipantRecord& record = participants_.emplace_back(fromSaved(saved));
     setAway(record, grace, now);
     poses_.add(record.id(), record.participant.role, true);
+    poses_.setBody(record.id(), record.participant.body);
     if (journal_)
       journal_->joined(record.id(), record.participant.clientName, record.participant.displayName);
   }
@@ -300,6 +305,35 @@ ParticipantTable::iterator Roster::expel(ParticipantTable::iterator record, cons
     mailbox->close(delivery::error(v1::ERROR_CODE_REMOVED, why, true));
   refusedTokens_.add(record->tokenHash);
   return erase(record, LeaveReason::removed, by, now);
+}
+
+std::string Roster::bodyOf(const Mailbox& mailbox) const {
+  const std::lock_guard lock(mutex_);
+  const auto record =
+      std::ranges::find(participants_, subscribers_.participantOf(mailbox), &ParticipantRecord::id);
+  return record == participants_.end() ? std::string() : record->participant.body;
+}
+
+messages::Result<void> Roster::wear(const Mailbox& by, const std::string& body) {
+  const std::lock_guard lock(mutex_);
+  const auto record = find(by);
+  if (record == participants_.end()) return {};
+  Participant& wearer = record->participant;
+  if (auto permitted = permit(wearer.role, Action::wear, {}); !permitted) return permitted;
+  if (wearer.body == body) return {};
+  if (!body.empty())
+    for (const ParticipantRecord& other : participants_)
+      if (other.participant.body == body)
+        return tl::unexpected(messages::FieldError{
+            v1::ERROR_CODE_PERMISSION_DENIED,
+            fmt::format(
+                "wearBody.collider = \"{}\": participant {} wears it; take another body, or wait until it "
+                "is given back",
+                body, other.id())});
+  wearer.body = body;
+  poses_.setBody(wearer.id, body);
+  subscribers_.announce(presenceMessage(v1::PRESENCE_KIND_BODY_CHANGED, wearer));
+  return {};
 }
 
 std::vector<Ban> Roster::bans() const {

@@ -140,6 +140,11 @@ class Roster {
                                                Clock::time_point now);
   [[nodiscard]] messages::Result<void> remove(const delivery::Mailbox& by,
                                               const v1::RemoveParticipant& message, Clock::time_point now);
+  // Name of the collider that the mailbox's participant wears; empty for none.
+  std::string bodyOf(const delivery::Mailbox& mailbox) const;
+  // The participant wears this body from now on; empty: none. Returns PERMISSION_DENIED if its role is too
+  // low or another participant wears the body.
+  [[nodiscard]] messages::Result<void> wear(const delivery::Mailbox& by, const std::string& body);
 
  private:
   // The caller of the following holds the lock.

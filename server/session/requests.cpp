@@ -158,6 +158,7 @@ struct Session::Messages {
          .state = State::inScene,
          .limit = kParticipants,
          .handle = removeParticipant},
+        {.body = Message::kWearBody, .state = State::inScene, .limit = kParticipants, .handle = wearBody},
         {.body = Message::kFrameAck, .state = State::inScene, .handle = frameAck},
         {.body = Message::kDatagramOffer,
          .state = State::inScene,
@@ -334,6 +335,26 @@ struct Session::Messages {
   static void removeParticipant(Session& session, const Message& message) {
     session.refuseUnless(
         session.scene_->roster.remove(*session.mailbox_, message.remove_participant(), session.now_));
+  }
+
+  static void wearBody(Session& session, const Message& message) {
+    scene::LiveScene& scene = *session.scene_;
+    scene::Roster& roster = scene.roster;
+    if (scene.source)
+      return session.refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
+                             fmt::format("wearBody: '{}' {}; its bodies cannot be worn", scene.name(),
+                                         scene.source->whyFixed())});
+    auto worn = messages::toWornBody(message.wear_body(), scene.start());
+    if (!worn) return session.refuse(worn.error());
+    const std::string before = roster.bodyOf(*session.mailbox_);
+    if (auto taken = roster.wear(*session.mailbox_, message.wear_body().collider()); !taken)
+      return session.refuse(taken.error());
+    if (worn->colliders().empty()) return;
+    const auto stopped = scene.change(session.participant_, *worn, roster.roleOf(*session.mailbox_));
+    if (stopped) return;
+    // A body that another participant has taken meanwhile does not come back.
+    if (!roster.wear(*session.mailbox_, before)) static_cast<void>(roster.wear(*session.mailbox_, {}));
+    session.refuse(stopped.error());
   }
 
   static void frameAck(Session& session, const Message& message) {

@@ -257,7 +257,8 @@ TEST(InputLines, ErrorsNameThePartThatIsWrong) {
   EXPECT_EQ(errorOf("[]"), "a line must be an object");
   EXPECT_EQ(
       errorOf(R"({"collider": []})"),
-      "\"collider\" is not a key of a line; use after, colliders, grabs, head, hands, attachments, joints");
+      "\"collider\" is not a key of a line; use after, colliders, grabs, head, hands, attachments, joints, "
+      "wear, body");
   EXPECT_EQ(errorOf(R"({"after": -1})"), "after must be 0 to 86400 s");
   EXPECT_EQ(errorOf(R"({"colliders": [{"position": [0, 0, 0]}]})"),
             "colliders[0] must have one of \"sphere\", \"capsule\" and \"box\"");
@@ -271,6 +272,11 @@ TEST(InputLines, ErrorsNameThePartThatIsWrong) {
             "grabs[0].id must be an integer, 0 to 4294967295");
   EXPECT_EQ(errorOf(R"({"hands": {"left": [[0, 0, 0, 1]]}})"),
             "hands.left has 1 joints; use 26 (OpenXR) or 25 (WebXR)");
+  EXPECT_EQ(errorOf(R"({"wear": 3})"),
+            "wear must be the name of a collider, or null, which gives the body back");
+  EXPECT_EQ(errorOf(R"({"body": {"floor": 1}})"), "body has no \"head\"");
+  EXPECT_EQ(errorOf(R"({"body": {"head": {"position": [0, 1, 0]}, "hips": [1, 2]}})"),
+            "body.hips must be an array of 3 numbers");
   EXPECT_EQ(errorOf(R"({"attachments": [{"position": [0, 0, 0]}]})"),
             "attachments[0] must have a \"name\", a text");
   EXPECT_EQ(errorOf(R"({"attachments": [{"name": "rod", "position": [0, 0, 0], "jumps": 1}]})"),

@@ -2,7 +2,10 @@
 // A client moves a joint of a collider that is a mesh, and every other client sees the mesh and the cloth
 // move.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <csignal>
+#include <cstdint>
 #include <fstream>
 #include <memory>
 #include <stdexcept>
@@ -154,6 +157,81 @@ TEST_F(MovedJoints, AreRefusedForAnUnknownColliderWithTheKnownNames) {
   const auto mover = move(R"({"joints": [{"collider": "leg", "poses": []}]})"
                           "\n");
   EXPECT_TRUE(mover->waitForOutput("must be one of block", kPatience)) << mover->output() << mover->errors();
+}
+
+class WornBody : public MovedJoints {
+ protected:
+  void SetUp() override { startServer({"--scene", "walker"}); }
+
+  // Distance from a point of the scene to the nearest vertex of the avatar, m.
+  static double distanceTo(NativeClient& client, const std::array<double, 3>& point) {
+    double nearest = 1e9;
+    client.visit([&](cs_client* core) {
+      cs_collider avatar;
+      std::uint32_t vertices = 0, indices = 0;
+      const std::uint32_t* triangles = nullptr;
+      if (cs_get_collider(core, 0, &avatar) == 0) return;
+      const float* corners = cs_get_hull(core, 0, &vertices, &triangles, &indices);
+      const double x = avatar.orientation[0], y = avatar.orientation[1], z = avatar.orientation[2],
+                   w = avatar.orientation[3];
+      // The point in the frame of the collider: turned by the inverse rotation.
+      std::array<double, 3> p{};
+      for (std::size_t i = 0; i < 3; ++i) p[i] = point[i] - static_cast<double>(avatar.position[i]);
+      const std::array<double, 3> q{
+          (1 - 2 * (y * y + z * z)) * p[0] + 2 * (x * y + w * z) * p[1] + 2 * (x * z - w * y) * p[2],
+          2 * (x * y - w * z) * p[0] + (1 - 2 * (x * x + z * z)) * p[1] + 2 * (y * z + w * x) * p[2],
+          2 * (x * z + w * y) * p[0] + 2 * (y * z - w * x) * p[1] + (1 - 2 * (x * x + y * y)) * p[2]};
+      for (std::uint32_t i = 0; i < vertices; ++i)
+        nearest = std::min(nearest, std::hypot(static_cast<double>(corners[3 * i]) - q[0],
+                                               static_cast<double>(corners[3 * i + 1]) - q[1],
+                                               static_cast<double>(corners[3 * i + 2]) - q[2]));
+    });
+    return nearest;
+  }
+  // What the client has heard: names of the worn bodies, and the newest error.
+  static std::string wornIn(NativeClient& client) {
+    std::string worn;
+    client.visit([&](cs_client* core) {
+      cs_participant one;
+      for (std::uint32_t i = 0; cs_get_participant(core, i, &one) != 0; ++i) worn += cs_body_of(core, one.id);
+    });
+    return worn;
+  }
+};
+
+// The right hand of a person at z = 2 is 0.38 m from the shoulder. The radius of the avatar's arm is below 5
+// cm.
+TEST_F(WornBody, FollowsItsWearerAndNoOtherClient) {
+  if (IsSkipped()) return;
+  constexpr std::array kHand{0.3, 1.15, 1.75};
+  const auto watcher = watch(true);
+  EXPECT_GT(distanceTo(*watcher, kHand), 0.2) << "the avatar walks around the origin";
+  const auto wearer = move(R"({"wear": "avatar", "body": {"head": {"position": [0, 1.55, 2]}, )"
+                           R"("rightHand": {"position": [0.3, 1.15, 1.75]}}})"
+                           "\n");
+  EXPECT_TRUE(eventually([&] { return wornIn(*watcher) == "avatar"; })) << wearer->errors();
+  EXPECT_TRUE(eventually([&] { return distanceTo(*watcher, kHand) < 0.07; }))
+      << distanceTo(*watcher, kHand) << "\n"
+      << wearer->errors();
+  watcher->visit([](cs_client* core) {
+    const std::vector<float> still(7 * 13, 0.0f);
+    cs_move_joints(core, "avatar", still.data(), 13, 1, NativeClient::nowUs());
+  });
+  EXPECT_TRUE(eventually([&] {
+    std::string error;
+    watcher->visit([&](cs_client* core) { error = cs_error_text(core); });
+    return error.find("wears it, so only that participant moves it") != std::string::npos;
+  }));
+  EXPECT_LT(distanceTo(*watcher, kHand), 0.07) << "it does not move";
+  wearer->signal(SIGTERM);
+  EXPECT_TRUE(eventually([&] { return wornIn(*watcher).empty(); }));
+}
+
+TEST_F(WornBody, IsRefusedWithTheNamesOfOthers) {
+  if (IsSkipped()) return;
+  const auto wearer = move("{\"wear\": \"floor\"}\n");
+  EXPECT_TRUE(wearer->waitForEnd(kPatience).has_value());
+  EXPECT_THAT(wearer->errors(), HasSubstr("line 1: wear: \"floor\" is not a body of the scene; use avatar"));
 }
 
 }  // namespace

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Colliders that are meshes, and their joints, in messages.
+#include "server/messages/solid_message.h"
+
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -234,6 +237,44 @@ TEST(SolidMessage, PosesOfJointsAreOfAColliderThatHasThem) {
   joints.set_collider("nobody");
   EXPECT_THAT(toPoses(message, scene).error().text,
               StartsWith("colliderPoses.joints[0].collider = \"nobody\": must be one of ball"));
+}
+
+TEST(SolidMessage, BodiesThatAreTakenHaveJointsAndMayStand) {
+  const model::Scene scene = *toScene(sceneWithMesh());
+  v1::WearBody message;
+  EXPECT_EQ(toWornBody(message, scene).value().colliders_size(), 0) << "the body is given back";
+  message.set_collider("ball");
+  EXPECT_EQ(toWornBody(message, scene).value().colliders_size(), 0) << "it keeps its motion";
+  message.mutable_stands()->mutable_position()->set_y(2);
+  const v1::ParameterChange change = toWornBody(message, scene).value();
+  ASSERT_EQ(change.colliders_size(), 1);
+  EXPECT_EQ(change.colliders(0).name(), "ball");
+  EXPECT_EQ(change.colliders(0).position().y(), 2);
+  EXPECT_EQ(change.colliders(0).orientation().w(), 1);
+  EXPECT_THAT(toWornBody(message, *toScene(smallScene())).error().text,
+              StartsWith("wearBody.collider = \"ball\": has no joints"));
+  message.set_collider("stranger");
+  EXPECT_THAT(toWornBody(message, scene).error().text,
+              StartsWith("wearBody.collider = \"stranger\": must be one of ball"));
+  message.set_collider("ball");
+  model::Scene fine = scene;
+  fine.stream.maxError = 1e-5f;
+  const float far = 2 * model::reachOf(fine.stream);
+  ASSERT_LT(far, 1000) << "the limit of positions";
+  message.mutable_stands()->mutable_position()->set_y(far);
+  EXPECT_THAT(toWornBody(message, fine).error().text, StartsWith("wearBody.stands = "));
+  message.mutable_stands()->mutable_position()->set_y(std::numeric_limits<float>::quiet_NaN());
+  EXPECT_THAT(toWornBody(message, scene).error().text, StartsWith("wearBody.stands.position.y = nan"));
+}
+
+TEST(SolidMessage, DescriptionHasTheNamesAndParentsOfJoints) {
+  const model::Scene scene = *toScene(sceneWithMesh());
+  v1::ColliderMeshDescription message;
+  write(*std::get<model::Solid>(scene.colliders[0].shape), message);
+  ASSERT_EQ(message.joint_names_size(), 2);
+  EXPECT_EQ(message.joint_names(0), "root");
+  EXPECT_EQ(message.joint_parents(0), 0u);
+  EXPECT_EQ(message.joint_parents(1), 1u) << "the joint with index 0";
 }
 
 }  // namespace

@@ -96,6 +96,7 @@ TEST_F(SavedStateTest, CreatedScenesComeBackWithStateParametersAndParticipants) 
     other.join("mine");
     ada = owner.welcome().resume_token(), adaId = owner.welcome().participant_id();
     ben = other.welcome().resume_token(), benId = other.welcome().participant_id();
+    ASSERT_TRUE(live("mine")->roster.wear(*live("mine")->subscribers.find(benId), "ball"));
     v1::ParameterChange change;
     change.mutable_gravity()->mutable_value()->set_y(-3);
     owner.change(change);
@@ -124,6 +125,7 @@ TEST_F(SavedStateTest, CreatedScenesComeBackWithStateParametersAndParticipants) 
   other.readFrames(1);
   EXPECT_EQ(other.welcome().participant_id(), benId);
   EXPECT_EQ(other.welcome().role(), v1::ROLE_PARTICIPANT);
+  EXPECT_EQ(other.welcome().participants(1).body(), "ball");
   std::string wrong = ada;
   wrong[0] = static_cast<char>(wrong[0] ^ 1);
   stranger.hello(helloTo("mine", wrong));

@@ -37,7 +37,7 @@ const kSmall = ["--scene", "small", "--scene-file", join(here, "../e2e/small.jso
 const kCompiler = ["-unsafe", "-debug", "-warnaserror", "-langversion:7"];
 
 let folder;
-let program, sceneProgram;
+let program, sceneProgram, bodyProgram;
 
 before(async () => {
   folder = await mkdtemp(join(tmpdir(), "clothstream-unity-"));
@@ -49,6 +49,7 @@ before(async () => {
   // Without com.unity.xr.hands, and as in a build without checks.
   await compile("WithoutHands.dll", [components], references);
   const unity = await compile("ClothStream.Unity.dll", [components], [...references, "-define:CLOTHSTREAM_XR_HANDS", "-define:ENABLE_UNITY_COLLECTIONS_CHECKS"]);
+  bodyProgram = await compile("BodyProgram.exe", [join(here, "bodies")], [...references, `-r:${unity}`]);
   sceneProgram = await compile("SceneProgram.exe", [join(here, "scene"), join(package_, "Samples~/ClothInARoom")], [...references, `-r:${unity}`]);
 });
 
@@ -182,6 +183,9 @@ test("answers of other programs are refused with a reason", async () => {
 });
 
 test("components draw cloth, send hands and controllers, grab, and report errors", () => withServer(kSmall, (address) => mono(sceneProgram, address)));
+
+test("a body of the scene follows head, hands and controllers, and is drawn from the neck down for its wearer", () =>
+  withServer(["--scene", "walker"], (address) => mono(bodyProgram, address)));
 
 test("a connection pairs, and joins with the token that it got", () =>
   withServer([...kSmall, "--pairing", "--state-dir", join(folder, "pairing")], async (address, server) => {

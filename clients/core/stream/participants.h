@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -30,6 +32,13 @@ class Participants {
   }
 
   const std::vector<Participant>& all() const { return all_; }
+  // Name of the collider that a participant wears; empty for none.
+  const std::string& bodyOf(std::uint64_t id) const {
+    static const std::string none;
+    const auto known =
+        std::find_if(all_.begin(), all_.end(), [&](const Participant& one) { return one.id == id; });
+    return known == all_.end() ? none : known->body;
+  }
   // The newest change; kind 0 before the first.
   const Presence& newest() const { return newest_; }
 

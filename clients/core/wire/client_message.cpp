@@ -228,6 +228,20 @@ void writeColliderChange(std::string& out, std::uint64_t requestId, std::string_
   });
 }
 
+void writeWearBody(std::string& out, std::uint64_t requestId, const std::optional<StandingBody>& body) {
+  using F = field::WearBody;
+  std::string content;  // a nested Writer omits an empty message
+  if (body) {
+    Writer message(content);
+    message.add_string(F::kCollider.number, body->collider.data(), body->collider.size());
+    addPose(message, F::kStands, body->position, body->orientation);
+  }
+  out.clear();
+  Writer message(out);
+  message.add_uint64(field::ClientMessage::kRequestId.number, requestId);
+  message.add_message(field::ClientMessage::kWearBody.number, content);
+}
+
 void writePing(std::string& out, std::uint64_t requestId, std::uint64_t clientTimeUs) {
   writeMessage(out, requestId, field::ClientMessage::kPing,
                [&](Writer& ping) { ping.add_uint64(field::Ping::kClientTimeUs.number, clientTimeUs); });

@@ -81,6 +81,14 @@ void writeFrameAck(std::string& out, std::uint64_t tick);
 void writeKeyFrameRequest(std::string& out, std::uint32_t epoch, bool early);
 void writeSetRole(std::string& out, std::uint64_t requestId, std::uint64_t participant, std::uint32_t role);
 void writeRemoveParticipant(std::string& out, std::uint64_t requestId, std::uint64_t participant, bool ban);
+// Place where the collider of a body stands.
+struct StandingBody {
+  std::string_view collider;
+  std::array<float, 3> position{};
+  std::array<float, 4> orientation{};  // x y z w
+};
+// Without a body it is given back.
+void writeWearBody(std::string& out, std::uint64_t requestId, const std::optional<StandingBody>& body);
 void writeListScenes(std::string& out, std::uint64_t requestId);
 // Changes the clock of a scene. Empty members keep their value.
 struct SceneControl {

@@ -139,6 +139,10 @@ std::optional<Hull> readMesh(Bytes message) {
     if (tag == F::kWeights.tag)
       return copy(reader.get_view(), kVertexJoints, kMaxMeshVertices, out.skin.weights);
     if (tag == F::kRest.tag) return copyJoints(reader.get_view(), out.skin.rest);
+    if (tag == F::kJointNames.tag)
+      return out.skin.names.size() < kMaxJoints && setText(out.skin.names.emplace_back(), reader);
+    if (tag == F::kJointParents.tag)
+      return readPackedVarints(reader.get_view(), kMaxJoints, out.skin.parents);
     return tag == F::kTriangles.tag ? copy(reader.get_view(), 3, kMaxMeshTriangles, out.triangles)
                                     : skip(reader);
   });

@@ -335,6 +335,7 @@ struct PresenceKind {
   static constexpr std::uint32_t kRoleChanged = 3;
   static constexpr std::uint32_t kDisconnected = 4;
   static constexpr std::uint32_t kReturned = 5;
+  static constexpr std::uint32_t kBodyChanged = 6;
 };
 struct LeaveReason {
   static constexpr std::uint32_t kUnspecified = 0;
@@ -417,6 +418,7 @@ struct ClientMessage {
   static constexpr Field kUpload{21, WireType::kBytes};
   static constexpr Field kSetRole{30, WireType::kBytes};
   static constexpr Field kRemoveParticipant{31, WireType::kBytes};
+  static constexpr Field kWearBody{32, WireType::kBytes};
   static constexpr Field kStartRecording{40, WireType::kBytes};
   static constexpr Field kStopRecording{41, WireType::kBytes};
   static constexpr Field kAuthenticate{60, WireType::kBytes};
@@ -487,6 +489,7 @@ struct Participant {
   static constexpr Field kClientName{3, WireType::kBytes};
   static constexpr Field kRole{4, WireType::kVarint};
   static constexpr Field kAway{5, WireType::kVarint};
+  static constexpr Field kBody{6, WireType::kBytes};
 };
 struct Presence {
   static constexpr Field kKind{1, WireType::kVarint};
@@ -501,6 +504,10 @@ struct SetRole {
 struct RemoveParticipant {
   static constexpr Field kParticipantId{1, WireType::kVarint};
   static constexpr Field kBan{60, WireType::kVarint};
+};
+struct WearBody {
+  static constexpr Field kCollider{1, WireType::kBytes};
+  static constexpr Field kStands{2, WireType::kBytes};
 };
 struct AuthenticateRequest {
   static constexpr Field kToken{1, WireType::kBytes};
@@ -616,6 +623,8 @@ struct ColliderMeshDescription {
   static constexpr Field kJoints{3, WireType::kBytes};
   static constexpr Field kWeights{4, WireType::kBytes};
   static constexpr Field kRest{5, WireType::kBytes};
+  static constexpr Field kJointNames{6, WireType::kBytes};
+  static constexpr Field kJointParents{7, WireType::kBytes};
 };
 struct OperatingPoint {
   static constexpr Field kQuality{1, WireType::kVarint};

@@ -19,7 +19,8 @@ static_assert(CS_PRESENCE_JOINED == field::PresenceKind::kJoined &&
               CS_PRESENCE_LEFT == field::PresenceKind::kLeft &&
               CS_PRESENCE_ROLE_CHANGED == field::PresenceKind::kRoleChanged &&
               CS_PRESENCE_DISCONNECTED == field::PresenceKind::kDisconnected &&
-              CS_PRESENCE_RETURNED == field::PresenceKind::kReturned);
+              CS_PRESENCE_RETURNED == field::PresenceKind::kReturned &&
+              CS_PRESENCE_BODY_CHANGED == field::PresenceKind::kBodyChanged);
 static_assert(CS_LEAVE_LEFT == field::LeaveReason::kLeft &&
               CS_LEAVE_TIMED_OUT == field::LeaveReason::kTimedOut &&
               CS_LEAVE_REMOVED == field::LeaveReason::kRemoved);
@@ -76,6 +77,8 @@ bool readParticipant(Bytes message, Participant& out) {
         return set(out.role, reader.get_uint32());
       case F::kAway.tag:
         return set(out.away, reader.get_bool());
+      case F::kBody.tag:
+        return setText(out.body, reader) && out.body.size() <= kMaxNameBytes;
       default:
         return skip(reader);
     }

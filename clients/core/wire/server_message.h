@@ -56,6 +56,7 @@ struct Participant {
   std::string name, clientName;
   std::uint32_t role = 0;
   bool away = false;
+  std::string body;  // name of the collider that it wears; may be empty
 };
 
 struct Welcome {

@@ -36,6 +36,10 @@ JointFrame jointAt(std::span<const float> numbers, std::size_t joint) {
 
 bool Skin::fits(std::size_t vertices) const {
   const std::size_t count = jointCount();
+  if ((!names.empty() && names.size() != count) || (!parents.empty() && parents.size() != count))
+    return false;
+  for (std::size_t joint = 0; joint < parents.size(); ++joint)
+    if (parents[joint] > joint) return false;
   return count > 0 && count <= kMaxJoints && rest.size() % kJointNumbers == 0 &&
          joints.size() == kVertexJoints * vertices && weights.size() == joints.size() &&
          std::all_of(joints.begin(), joints.end(), [&](std::uint8_t joint) { return joint < count; }) &&

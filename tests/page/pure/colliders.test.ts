@@ -48,3 +48,27 @@ test("the drawn vertices of a small mesh follow its joints", () => {
   drawn.place(moving, [collider(Shape.hull)]);
   assert.deepEqual(places(), expected());
 });
+
+test("the own body is drawn without its head, which mirrors show", () => {
+  const corners = new Float32Array(3 * 200).map((_, i) => Math.sin(i)); // too many for a convex hull
+  const worn = {
+    frames: { hull: () => ({ vertices: corners.slice(), triangles: Uint32Array.of(0, 1, 2, 3, 4, 5, 6, 7, 8) }), hullVertices: () => corners },
+    wearing: { belowNeck: () => Uint32Array.of(3, 4, 5) },
+  } as unknown as Client;
+  const drawn = new ColliderMeshes();
+  const place = () => drawn.place(worn, [{ ...collider(Shape.hull), name: "avatar" }]);
+  const count = () => drawn.meshes[0]!.geometry.drawRange.count;
+  place();
+  assert.equal(count(), Infinity);
+  drawn.wear("avatar");
+  place();
+  assert.deepEqual([...drawn.meshes[0]!.geometry.index!.array], [3, 4, 5, 0, 1, 2, 6, 7, 8]);
+  assert.equal(count(), 3);
+  drawn.drawForMirror(true);
+  assert.equal(count(), Infinity);
+  drawn.drawForMirror(false);
+  assert.equal(count(), 3);
+  drawn.wear("");
+  place();
+  assert.equal(count(), Infinity);
+});

@@ -37,17 +37,19 @@ struct Member {
       messages.emplace_back().ParseFromArray((*bytes)->data(), static_cast<int>((*bytes)->size()));
     return messages;
   }
-  // Presence messages as text: "joined 2", "left 2 timed out", "role 3 owner by 1".
+  // Presence messages as text: "joined 2", "left 2 timed out", "role 3 owner by 1", "body 2 'avatar'".
   std::vector<std::string> heard() {
     std::vector<std::string> lines;
     for (const v1::ServerMessage& message : read()) {
       const v1::Presence& presence = message.presence();
-      constexpr const char* kKinds[] = {"?", "joined", "left", "role", "away", "back"};
+      constexpr const char* kKinds[] = {"?", "joined", "left", "role", "away", "back", "body"};
       constexpr const char* kReasons[] = {"", "", " timed out", " removed"};
       const bool isRole = presence.kind() == v1::PRESENCE_KIND_ROLE_CHANGED;
       std::string line = fmt::format(
           "{} {}{}{}{}", kKinds[presence.kind()], presence.participant().id(), isRole ? " " : "",
           isRole ? nameOf(fromMessage(presence.participant().role())) : "", kReasons[presence.reason()]);
+      if (presence.kind() == v1::PRESENCE_KIND_BODY_CHANGED)
+        line += fmt::format(" '{}'", presence.participant().body());
       if (presence.by_participant_id() != 0) line += fmt::format(" by {}", presence.by_participant_id());
       if (presence.kind() == v1::PRESENCE_KIND_DISCONNECTED ||
           presence.kind() == v1::PRESENCE_KIND_RETURNED) {

@@ -111,7 +111,7 @@ TEST_F(ParticipantsTest, ForbiddenActionIsRefusedAndChangesNothing) {
     v1::ClientMessage message;
     const char* role;  // required role
   };
-  std::vector<Asked> asked(10);
+  std::vector<Asked> asked(11);
   asked[0] = {"colliderPoses.colliders", {}, "participant"};
   v1::ParticipantCollider& hand = *asked[0].message.mutable_collider_poses()->add_colliders();
   hand.mutable_sphere()->set_radius(0.1f);
@@ -134,6 +134,8 @@ TEST_F(ParticipantsTest, ForbiddenActionIsRefusedAndChangesNothing) {
   asked[8].message.mutable_start_recording();
   asked[9] = {"stopRecording", {}, "owner"};
   asked[9].message.mutable_stop_recording();
+  asked[10] = {"wearBody", {}, "participant"};
+  asked[10].message.mutable_wear_body();
   for (const Asked& tried : asked)
     for (TestPeer* peer : {&viewer, &participant}) {
       if (peer == &participant && std::string(tried.role) == "participant") continue;

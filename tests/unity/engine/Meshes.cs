@@ -112,6 +112,24 @@ namespace UnityEngine
             bounds = found;
         }
 
+        // Fills the second stream, with the mean of the triangles by their areas.
+        public void RecalculateNormals()
+        {
+            var sums = new Vector3[vertexCount];
+            for (int i = 0; i < indices.Length; i += 12)
+            {
+                int a = BitConverter.ToInt32(indices, i), b = BitConverter.ToInt32(indices, i + 4), c = BitConverter.ToInt32(indices, i + 8);
+                Vector3 normal = Vector3.Cross(VertexAt(b) - VertexAt(a), VertexAt(c) - VertexAt(a));
+                foreach (int corner in new[] { a, b, c }) sums[corner] = sums[corner] + normal;
+            }
+            for (int i = 0; i < vertexCount; ++i)
+            {
+                float length = Vector3.Distance(sums[i], new Vector3());
+                if (length > 0) sums[i] = sums[i] * (1 / length);
+            }
+            SetVertexBufferData(sums, 0, 0, vertexCount, 1, MeshUpdateFlags.Default);
+        }
+
         public Vector3 VertexAt(int index) { return VectorAt(0, index); }
         public Vector3 NormalAt(int index) { return VectorAt(1, index); }
 

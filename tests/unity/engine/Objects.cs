@@ -172,7 +172,7 @@ namespace UnityEngine
 
     public static class Scene
     {
-        internal static readonly List<GameObject> Objects = new List<GameObject>();
+        public static readonly List<GameObject> Objects = new List<GameObject>();
 
         // Calls one message of all enabled behaviours.
         public static void Call(string message)

@@ -31,6 +31,7 @@ CS_MAX_SURFACE_TRIANGLES = 50000
 CS_SURFACE_VERSION = 1
 CS_GRAB_EVENT_VERSION = 1
 CS_CONTACT_EVENT_VERSION = 1
+CS_TRACKED_BODY_VERSION = 1
 CS_ENVIRONMENT_VERSION = 1
 CS_CLOTH_SETTINGS_VERSION = 1
 CS_COLLIDER_CHANGE_VERSION = 1
@@ -106,6 +107,14 @@ CS_GRAB_SLIPPED = 2
 CS_GRAB_RELEASED = 3
 CS_CONTACT_BEGAN = 1
 CS_CONTACT_ENDED = 2
+CS_BODY_HEAD = 1
+CS_BODY_LEFT_HAND = 2
+CS_BODY_RIGHT_HAND = 4
+CS_BODY_HIPS = 8
+CS_BODY_LEFT_ELBOW = 16
+CS_BODY_RIGHT_ELBOW = 32
+CS_BODY_LEFT_ANKLE = 64
+CS_BODY_RIGHT_ANKLE = 128
 CS_SOLVER_AS_IS = 0
 CS_SOLVER_MASS_SPRING = 1
 CS_SOLVER_CONSTRAINT = 2
@@ -117,6 +126,7 @@ CS_PRESENCE_LEFT = 2
 CS_PRESENCE_ROLE_CHANGED = 3
 CS_PRESENCE_DISCONNECTED = 4
 CS_PRESENCE_RETURNED = 5
+CS_PRESENCE_BODY_CHANGED = 6
 CS_LEAVE_LEFT = 1
 CS_LEAVE_TIMED_OUT = 2
 CS_LEAVE_REMOVED = 3
@@ -400,6 +410,23 @@ class cs_contact_event(c.Structure):
         ("cloth", c.c_char_p),
         ("impulse", c.c_float),
         ("seconds", c.c_float),
+    ]
+
+
+class cs_tracked_body(c.Structure):
+    VERSION = CS_TRACKED_BODY_VERSION
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("parts", c.c_uint32),
+        ("floor", c.c_float),
+        ("head", c.c_float * 7),
+        ("left_hand", c.c_float * 7),
+        ("right_hand", c.c_float * 7),
+        ("hips", c.c_float * 3),
+        ("left_elbow", c.c_float * 3),
+        ("right_elbow", c.c_float * 3),
+        ("left_ankle", c.c_float * 3),
+        ("right_ankle", c.c_float * 3),
     ]
 
 
@@ -820,6 +847,13 @@ FUNCTIONS = {
     "cs_set_winds": (c.c_int, [c.c_void_p, c.POINTER(cs_own_wind), c.c_uint32, c.c_uint64]),
     "cs_move_attachment": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.POINTER(c.c_float), c.c_int, c.c_uint64]),
     "cs_move_joints": (None, [c.c_void_p, c.c_char_p, c.POINTER(c.c_float), c.c_uint32, c.c_int, c.c_uint64]),
+    "cs_is_body": (c.c_int, [c.c_void_p, c.c_uint32]),
+    "cs_wear": (c.c_int, [c.c_void_p, c.c_char_p]),
+    "cs_body_of": (c.c_char_p, [c.c_void_p, c.c_uint64]),
+    "cs_set_body": (c.c_int, [c.c_void_p, c.POINTER(cs_tracked_body), c.c_uint64]),
+    "cs_get_body_part": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_float)]),
+    "cs_body_joints": (c.POINTER(c.c_float), [c.c_void_p, c.POINTER(c.c_uint32)]),
+    "cs_body_below_neck": (c.POINTER(c.c_uint32), [c.c_void_p, c.c_uint32, c.POINTER(c.c_uint32)]),
     "cs_get_surface_policy": (c.c_int, [c.c_void_p]),
     "cs_set_surface": (c.c_int, [c.c_void_p, c.POINTER(cs_surface)]),
     "cs_move_surface": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_float), c.POINTER(c.c_float)]),

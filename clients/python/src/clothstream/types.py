@@ -112,7 +112,7 @@ class Participant:
 
 @dataclasses.dataclass(frozen=True)
 class Presence:
-    kind: int  # 1 joined, 2 left, 3 role changed, 4 disconnected, 5 returned
+    kind: int  # 1 joined, 2 left, 3 role changed, 4 disconnected, 5 returned, 6 wears another body
     reason: int  # of leaving: 1 left, 2 timed out, 3 removed
     by: int  # id of the participant who caused it; 0: the participant itself or the server
     participant: Participant

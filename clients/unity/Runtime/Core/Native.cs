@@ -148,6 +148,21 @@ namespace ClothStream.Core
     }
 
     /// <summary>
+    /// Parts of a body that are tracked. Left and right are those of the person.
+    /// </summary>
+    public enum BodyPart : uint
+    {
+        Head = 1,
+        LeftHand = 2,
+        RightHand = 4,
+        Hips = 8,
+        LeftElbow = 16,
+        RightElbow = 32,
+        LeftAnkle = 64,
+        RightAnkle = 128,
+    }
+
+    /// <summary>
     /// Solver.kind of scene.proto.
     /// </summary>
     public enum Solver : uint
@@ -170,6 +185,7 @@ namespace ClothStream.Core
         RoleChanged = 3,
         Disconnected = 4,
         Returned = 5,
+        BodyChanged = 6,
     }
 
     /// <summary>
@@ -747,6 +763,55 @@ namespace ClothStream.Core
         [FieldOffset(44)] public float seconds;
     }
 
+    /// <summary>
+    /// What is known of a person, in the scene, whose +Y is up. Poses are position (m) and quaternion x y z w.
+    /// </summary>
+    [StructLayout(LayoutKind.Explicit, Size = 156)]
+    public unsafe struct TrackedBody
+    {
+        [FieldOffset(0)] public uint version;
+        /// <summary>
+        /// sum of the cs_body_part that are tracked; CS_BODY_HEAD is required, others have no effect
+        /// </summary>
+        [FieldOffset(4)] public uint parts;
+        /// <summary>
+        /// height of the floor, m
+        /// </summary>
+        [FieldOffset(8)] public float floor;
+        /// <summary>
+        /// between the eyes; looks along -Z
+        /// </summary>
+        [FieldOffset(12)] public fixed float head[7];
+        /// <summary>
+        /// Wrists: the fingers point along -Z, and the back of the hand to +Y, as WebXR and OpenXR have it.
+        /// </summary>
+        [FieldOffset(40)] public fixed float leftHand[7];
+        /// <summary>
+        /// Wrists: the fingers point along -Z, and the back of the hand to +Y, as WebXR and OpenXR have it.
+        /// </summary>
+        [FieldOffset(68)] public fixed float rightHand[7];
+        /// <summary>
+        /// Joints of body tracking, m.
+        /// </summary>
+        [FieldOffset(96)] public fixed float hips[3];
+        /// <summary>
+        /// Joints of body tracking, m.
+        /// </summary>
+        [FieldOffset(108)] public fixed float leftElbow[3];
+        /// <summary>
+        /// Joints of body tracking, m.
+        /// </summary>
+        [FieldOffset(120)] public fixed float rightElbow[3];
+        /// <summary>
+        /// Joints of body tracking, m.
+        /// </summary>
+        [FieldOffset(132)] public fixed float leftAnkle[3];
+        /// <summary>
+        /// Joints of body tracking, m.
+        /// </summary>
+        [FieldOffset(144)] public fixed float rightAnkle[3];
+    }
+
     [StructLayout(LayoutKind.Explicit, Size = 40)]
     public unsafe struct Environment
     {
@@ -1290,6 +1355,7 @@ namespace ClothStream.Core
         public const uint CS_SURFACE_VERSION = 1;
         public const uint CS_GRAB_EVENT_VERSION = 1;
         public const uint CS_CONTACT_EVENT_VERSION = 1;
+        public const uint CS_TRACKED_BODY_VERSION = 1;
         public const uint CS_ENVIRONMENT_VERSION = 1;
         public const uint CS_CLOTH_SETTINGS_VERSION = 1;
         public const uint CS_COLLIDER_CHANGE_VERSION = 1;
@@ -1698,6 +1764,45 @@ namespace ClothStream.Core
         /// that follows them goes along: use this for teleports and cuts of an animation.
         /// </summary>
         [DllImport(Library)] public static extern void cs_move_joints(IntPtr client, byte* collider, float* poses, uint count, int jumps, ulong nowUs);
+        /// <summary>
+        /// Returns 1 if the collider with this index is a human body that can be worn: a mesh with joints whose names
+        /// say hips, head, arms and forearms (docs/bodies.md); else 0. Servers that do not know bodies send no names
+        /// of joints.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_is_body(IntPtr client, uint collider);
+        /// <summary>
+        /// Takes a collider of the scene as the body of this participant, and gives back the one that it has; NULL or
+        /// "" only gives back. The body stands where it is shown now. CS_EVENT_PRESENCE announces the result to
+        /// everyone. If the server refuses, because another participant wears the body for example, CS_EVENT_ERROR
+        /// follows, and this participant keeps the body that it had. Fails, and sends nothing, if there is no such
+        /// body.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_wear(IntPtr client, byte* collider);
+        /// <summary>
+        /// Name of the collider that a participant wears; "" for none.
+        /// </summary>
+        [DllImport(Library)] public static extern byte* cs_body_of(IntPtr client, ulong participantId);
+        /// <summary>
+        /// Bends the body that this client wears to a person, and sends its joints. Call it once for each displayed
+        /// frame. It jumps if it is the first call, or the head has moved by more than 1 m. Fails, and changes
+        /// nothing, without a body or a tracked head, if a number is not finite, or for an unknown version.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_set_body(IntPtr client, TrackedBody* tracked, ulong nowUs);
+        /// <summary>
+        /// Where the newest cs_set_body has put a cs_body_part: position and quaternion x y z w. A wrist that is
+        /// nearer to the tracked one than 2 cm is within the reach of the arm. Fails before, or if the body has no
+        /// such part.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_get_body_part(IntPtr client, uint part, float* pose7);
+        /// <summary>
+        /// Poses of all joints that the newest cs_set_body has sent, as in cs_move_joints; NULL and 0 before.
+        /// </summary>
+        [DllImport(Library)] public static extern float* cs_body_joints(IntPtr client, uint* count);
+        /// <summary>
+        /// Corners of the triangles of a body (cs_get_hull) that its neck and head do not move, for the view out of
+        /// the head. NULL and 0 if it is not a body. Valid until the next call.
+        /// </summary>
+        [DllImport(Library)] public static extern uint* cs_body_below_neck(IntPtr client, uint collider, uint* indexCount);
         /// <summary>
         /// Returns the policy of the server for surfaces of the real room, from the newest Welcome.
         /// </summary>

@@ -8,12 +8,12 @@ namespace ClothStream
 {
     /// <summary>
     /// Sends the tracked hands of this person, or else the controllers, and the head. A pinch or the trigger grabs cloth. Hands
-    /// need the package com.unity.xr.hands.
+    /// need the package com.unity.xr.hands. A body of the scene follows head and hands if `body` names it.
     /// </summary>
     [AddComponentMenu("ClothStream/ClothStream Input")]
     public sealed class ClothStreamInput : MonoBehaviour
     {
-        const int Joints = (int)Native.CS_HAND_JOINTS;
+        const int Joints = (int)Native.CS_HAND_JOINTS, Wrist = 1;
         static readonly HandSide[] Sides = { HandSide.Left, HandSide.Right };
 
         [Tooltip("Connection to which the poses are sent. Empty: the one on this object or its parents.")]
@@ -31,6 +31,10 @@ namespace ClothStream
         [Tooltip("Distance in metres within which a pinch or trigger grabs cloth.")]
         [Range(0.01f, 0.3f)]
         public float grabReach = 0.05f;
+        [Tooltip("Name of the collider of the scene that this person wears as the own body. Empty: none. Needs a head.")]
+        public string body = "";
+        [Tooltip("Object at the height of the floor, usually the XR Origin. Empty: the tracking origin, or else the connection.")]
+        public Transform floor;
 
         readonly PinchGrab[] grabs = { new PinchGrab(0), new PinchGrab(1) };
         readonly Grab[] held = new Grab[2];
@@ -40,6 +44,11 @@ namespace ClothStream
         readonly Vector3[] places = new Vector3[Joints];
         readonly float[] radii = new float[Joints];
         static readonly float[] NoJoints = new float[0];
+        Client wearing; // that was asked for `worn`
+        string worn = "";
+
+        /// <summary>Whether a body of the scene follows this person.</summary>
+        public bool IsWearing { get; private set; }
 
         void OnEnable()
         {
@@ -55,15 +64,18 @@ namespace ClothStream
             Client client = connection.Client;
             ulong nowUs = Client.NowUs;
             int count = 0, sphereCount = 0;
+            var person = new PersonSample();
             for (int i = 0; i < Sides.Length; ++i)
             {
                 var sample = new HandSample { joints = places, radii = radii };
                 bool isTracked = TryGetHand(Sides[i], ref sample);
                 client.SetHand(Sides[i], isTracked ? StreamJoints(sample) : NoJoints, nowUs);
+                if (isTracked) person.SetHand(Sides[i], connection.ToStream(sample.joints[Wrist]), connection.ToStream(sample.rotation));
                 if (!isTracked && TryGetController(Sides[i], ref sample))
                 {
                     isTracked = true;
                     spheres[sphereCount++] = Sphere(sample.position);
+                    person.SetGrip(Sides[i], connection.ToStream(sample.position), connection.ToStream(sample.rotation));
                 }
                 if (isTracked) UpdateGrab(client, grabs[i], sample);
                 else grabs[i].Release();
@@ -76,6 +88,27 @@ namespace ClothStream
             if (head == null) return;
             Store(connection.ToStream(head.position), connection.ToStream(head.rotation));
             client.SetHead(position, orientation, headRadius, nowUs);
+            MoveBody(client, person, nowUs);
+        }
+
+        void MoveBody(Client client, PersonSample person, ulong nowUs)
+        {
+            if (wearing != client || worn != body)
+            {
+                wearing = client;
+                worn = body;
+                if (!client.Wear(body)) Debug.LogWarning("ClothStream: The scene has no body \"" + body + "\". " + BodiesOf(client), this);
+            }
+            Transform ground = floor != null ? floor : trackingOrigin != null ? trackingOrigin : connection.transform;
+            person.SetFloor(connection.ToStream(ground.position).y);
+            person.SetHead(connection.ToStream(head.position), connection.ToStream(head.rotation));
+            IsWearing = client.SetBody(person.Tracked, nowUs);
+        }
+
+        static string BodiesOf(Client client)
+        {
+            string[] names = System.Array.ConvertAll(client.Bodies, one => one.Value);
+            return names.Length == 0 ? "It has none." : "Use " + string.Join(", ", names) + ".";
         }
 
         void OnDisable()
@@ -88,6 +121,9 @@ namespace ClothStream
             client.SetShapes(spheres, 0, nowUs);
             client.SetGrabs(held, null, 0, nowUs);
             client.SetHead(null, null, headRadius, nowUs);
+            if (worn != "") client.Wear("");
+            worn = "";
+            IsWearing = false;
         }
 
         bool TryGetHand(HandSide side, ref HandSample sample)

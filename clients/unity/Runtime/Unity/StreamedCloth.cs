@@ -17,8 +17,8 @@ namespace ClothStream
     [AddComponentMenu("ClothStream/Streamed Cloth")]
     public sealed unsafe class StreamedCloth : MonoBehaviour
     {
-        const MeshUpdateFlags Unchecked = MeshUpdateFlags.DontValidateIndices | MeshUpdateFlags.DontNotifyMeshUsers |
-                                          MeshUpdateFlags.DontRecalculateBounds | MeshUpdateFlags.DontResetBoneBounds;
+        internal const MeshUpdateFlags Unchecked = MeshUpdateFlags.DontValidateIndices | MeshUpdateFlags.DontNotifyMeshUsers |
+                                                   MeshUpdateFlags.DontRecalculateBounds | MeshUpdateFlags.DontResetBoneBounds;
 
         [Tooltip("Connection whose cloths are drawn. Empty: the one on this object or its parents.")]
         public ClothStreamConnection connection;
@@ -116,7 +116,7 @@ namespace ClothStream
         }
 
         // Memory of the client core as an array, without a copy.
-        static NativeArray<T> View<T>(void* first, int count) where T : struct
+        internal static NativeArray<T> View<T>(void* first, int count) where T : struct
         {
             NativeArray<T> view = NativeArrayUnsafeUtility.ConvertExistingDataToNativeArray<T>(first, count, Allocator.None);
 #if ENABLE_UNITY_COLLECTIONS_CHECKS

@@ -22,6 +22,7 @@ import type { DatagramAnswer, DatagramOffer } from "./session_description";
 import { Settings } from "./cloth_settings";
 import { ClientState, type Identity } from "./types";
 import { CoreBuffer, type CoreModule } from "./wasm";
+import { Wearing } from "./wearing";
 
 // Result of decoding in the client that a mirror follows (cs_decoding).
 export enum Decoding {
@@ -45,6 +46,7 @@ export class Client {
   readonly playback: PlaybackControl;
   readonly requests: SceneRequests;
   readonly settings: Settings;
+  readonly wearing: Wearing;
   private readonly handle: CoreHandle;
   private readonly inbox: CoreBuffer<Uint8Array>;
   private readonly decoded: CoreBuffer<Float32Array>;
@@ -80,6 +82,7 @@ export class Client {
     this.playback = new PlaybackControl(this.handle);
     this.requests = new SceneRequests(this.handle);
     this.settings = new Settings(this.handle);
+    this.wearing = new Wearing(this.handle);
   }
 
   destroy(): void {

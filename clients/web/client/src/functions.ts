@@ -92,6 +92,13 @@ export interface CoreFunctions {
   cs_set_winds(client: Pointer, winds: Pointer, count: number, nowUs: bigint): number;
   cs_move_attachment(client: Pointer, attachment: Pointer, position3: Pointer, orientation4: Pointer, jumps: number, nowUs: bigint): void;
   cs_move_joints(client: Pointer, collider: Pointer, poses: Pointer, count: number, jumps: number, nowUs: bigint): void;
+  cs_is_body(client: Pointer, collider: number): number;
+  cs_wear(client: Pointer, collider: Pointer): number;
+  cs_body_of(client: Pointer, participantId: bigint): Pointer;
+  cs_set_body(client: Pointer, tracked: Pointer, nowUs: bigint): number;
+  cs_get_body_part(client: Pointer, part: number, pose7: Pointer): number;
+  cs_body_joints(client: Pointer, count: Pointer): Pointer;
+  cs_body_below_neck(client: Pointer, collider: number, indexCount: Pointer): Pointer;
   cs_get_surface_policy(client: Pointer): number;
   cs_set_surface(client: Pointer, surface: Pointer): number;
   cs_move_surface(client: Pointer, id: number, position3: Pointer, orientation4: Pointer): number;

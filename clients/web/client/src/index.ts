@@ -7,6 +7,7 @@ export { Frames } from "./frames";
 export { Input } from "./input";
 export type { Proof } from "./thread_messages";
 export * from "./types";
+export { BodyPart, Wearing, type BodyPose, type TrackedBody } from "./wearing";
 export {
   sceneBytes,
   type FigureJoint,

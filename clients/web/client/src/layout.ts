@@ -21,6 +21,7 @@ export const CS_OWN_WIND_VERSION = 1;
 export const CS_SURFACE_VERSION = 1;
 export const CS_GRAB_EVENT_VERSION = 1;
 export const CS_CONTACT_EVENT_VERSION = 1;
+export const CS_TRACKED_BODY_VERSION = 1;
 export const CS_ENVIRONMENT_VERSION = 1;
 export const CS_CLOTH_SETTINGS_VERSION = 1;
 export const CS_COLLIDER_CHANGE_VERSION = 1;
@@ -226,6 +227,20 @@ export const cs_contact_event = {
   cloth: 28,
   impulse: 32,
   seconds: 36,
+} as const;
+export const cs_tracked_body = {
+  sizeof: 156,
+  version: 0,
+  parts: 4,
+  floor: 8,
+  head: 12,
+  left_hand: 40,
+  right_hand: 68,
+  hips: 96,
+  left_elbow: 108,
+  right_elbow: 120,
+  left_ankle: 132,
+  right_ankle: 144,
 } as const;
 export const cs_environment = {
   sizeof: 40,

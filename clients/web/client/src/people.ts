@@ -36,6 +36,7 @@ export class People {
         role: view.getUint32(at + cs_participant.role, true),
         away: view.getInt32(at + cs_participant.away, true) !== 0,
         self: id === own,
+        body: this.handle.core.text(this.handle.core.exports.cs_body_of(this.handle.pointer, id)),
       };
     });
   }

@@ -163,6 +163,7 @@ export interface Participant {
   role: number;
   away: boolean; // disconnected, within the reconnect grace
   self: boolean;
+  body: string; // name of the collider that it wears; "" for none
 }
 
 // Stiffness in N/m and damping in N s/m.

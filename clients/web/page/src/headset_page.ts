@@ -37,6 +37,7 @@ export class HeadsetPage {
   private readonly content: HeadsetPanel;
   private isBefore = false; // the panel is before the eyes
   private why: Failure | undefined; // there is no headset
+  private worn = ""; // name of the own body, as it is drawn
 
   constructor(
     private readonly view: View,
@@ -48,6 +49,8 @@ export class HeadsetPage {
     this.headset = makeHeadset(view, session, {
       left: () => {
         this.isBefore = false;
+        this.wear("");
+        this.showBody("");
         view.resize();
         view.reset();
       },
@@ -60,6 +63,7 @@ export class HeadsetPage {
       doingChosen: (doing) => this.headset.do(doing),
       left: () => void this.headset.leave(),
       fanToggled: () => this.holdFan(!this.headset.body.holdsFan),
+      bodyChosen: (body) => this.wear(body),
       changed: () => this.show(),
     });
     this.headset.seat.add(this.panel.mesh);
@@ -78,6 +82,7 @@ export class HeadsetPage {
   // Call first in each frame of a session.
   draw(frame: XRFrame, now: number, client: Client | undefined): void {
     this.headset.update(frame, now, client);
+    this.showBody(client?.wearing.isWearing ? client.wearing.own : "");
     if (client) this.session.flush();
   }
 
@@ -90,6 +95,21 @@ export class HeadsetPage {
     this.put(kPanelPlace, kPanelTurn, kPanelTilt);
     const words = current ? [current.title + ".", current.wait].join(" ").trim() : undefined;
     this.panel.show(this.session.client.sceneName || "ClothStream", this.content.rows(this.headset.mode, this.headset.doing, this.headset.body.holdsFan, words));
+  }
+
+  // Takes a body of the scene, or gives the own one back.
+  private wear(body: string): void {
+    this.session.client.wearing.wear(body || undefined);
+    this.session.flush();
+    this.show();
+  }
+
+  private showBody(body: string): void {
+    if (body === this.worn) return;
+    this.worn = body;
+    const { head, headOrientation } = this.headset.body;
+    this.view.wear(body, head, new THREE.Vector3(0, 0, -1).applyQuaternion(headOrientation));
+    this.show();
   }
 
   // Takes the fan in the hand, or puts it away.

@@ -10,6 +10,7 @@ const kTabs = ["Scenes", "People", "Quality", "Figures"] as const;
 const kOnePage = 7; // rows of a list
 const kFiguresRows = 6.7;
 const kMessageMs = 6000;
+const kMostBodies = 3; // buttons in a row
 
 // Colours of the figures on the panel, which is dark.
 const kTheme: HudTheme = {
@@ -27,6 +28,8 @@ export interface HeadsetPanelListener {
   doingChosen(doing: Doing): void;
   left(): void;
   fanToggled(): void;
+  // "" gives the own body back.
+  bodyChosen(body: string): void;
   // The rows have changed by a press.
   changed(): void;
 }
@@ -69,8 +72,10 @@ export class HeadsetPanel {
 
   private content(holdsFan: boolean): PanelRow[] {
     switch (this.tab) {
-      case "Scenes":
-        return [this.actions(holdsFan), ...this.list(this.scenes(), kOnePage)];
+      case "Scenes": {
+        const bodies = this.bodies();
+        return [this.actions(holdsFan), ...bodies, ...this.list(this.scenes(), kOnePage - bodies.length)];
+      }
       case "People":
         return this.list(this.people(), kOnePage + 1);
       case "Quality":
@@ -97,6 +102,26 @@ export class HeadsetPanel {
     const button = (text: string, action: () => Promise<void>): PanelButton => ({ text, ...(allowed ? { action: () => void action() } : {}) });
     const fan = { text: "Fan", isChosen: holdsFan, action: () => this.listener.fanToggled() };
     return { buttons: [button("Reset", () => scenes.reset()), button(scenes.isPaused ? "Continue" : "Pause", () => scenes.pause()), fan] };
+  }
+
+  // A button for each body of the scene that no other participant wears. None if the scene has no bodies.
+  private bodies(): PanelRow[] {
+    const { wearing, frames, people } = this.session.client;
+    if (this.session.state.kind !== "live") return [];
+    const { own } = wearing;
+    const taken = new Set(people.participants().filter(({ self }) => !self).map(({ body }) => body));
+    const names = frames
+      .colliders()
+      .filter(({ index, participantId }) => participantId === 0n && wearing.isBody(index))
+      .map(({ name }) => name)
+      .slice(0, kMostBodies);
+    if (names.length === 0) return [];
+    const buttons = names.map((name) => {
+      const isChosen = name === own;
+      const action = () => this.listener.bodyChosen(isChosen ? "" : name);
+      return { text: `${isChosen ? "Take off" : "Wear"} ${name.replaceAll("_", " ")}`, isChosen, ...(taken.has(name) ? {} : { action }) };
+    });
+    return [{ buttons }];
   }
 
   private scenes(): PanelRow[] {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `window.clothstream`: read-only view of the page's state, for tests and debugging.
 
-import type { Client, ClothLayout, ClothReport, Collider, Link, Participant, Playback, Session, SessionState, SkinLimitLists, Stages, Statistics, Vec3 } from "@clothstream/client";
+import type { BodyPart, BodyPose, Client, ClothLayout, ClothReport, Collider, Link, Participant, Playback, Session, SessionState, SkinLimitLists, Stages, Statistics, Vec3 } from "@clothstream/client";
 import * as THREE from "three";
 import type { CanvasPanel, Doing, Headset } from "@clothstream/three";
 import type { FrameWork } from "./frame_work";
@@ -74,6 +74,8 @@ export interface HeadsetProbe {
     readonly texts: string[];
     readonly buttons: { text: string; isChosen: boolean; isEnabled: boolean; place: Vec3 }[];
   };
+  // The own body: name ("" for none), and where its parts are in the scene. `mirror`: whether a mirror stands there.
+  readonly worn: { name: string; mirror: boolean; part(part: BodyPart): BodyPose | undefined };
   // Hands, controllers and rays that are there. Joints: x, y, z, radius of each, in the scene.
   readonly limbs: { side: string; isHand: boolean; holds: boolean; joints: number[]; point: Vec3 }[];
 }
@@ -174,6 +176,11 @@ export function expose(session: Session, view: View, { headset, panel, work, his
         placement: headset.placement.matrix.toArray(),
         shadowReach: view.shadowReach,
         choose: (doing: Doing) => headset.do(doing),
+        worn: {
+          name: session.client.wearing.own,
+          mirror: view.hasMirror,
+          part: (part: BodyPart) => session.client.wearing.part(part),
+        },
         panel: {
           place: panel.mesh.getWorldPosition(new THREE.Vector3()).toArray(),
           canvas: panel.canvas,

@@ -4,7 +4,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Shape, type Client, type Vec3 } from "@clothstream/client";
-import { Cloths, ColliderMeshes, ConstraintLines, type Detail, People, reachOf, type ColliderMesh } from "@clothstream/three";
+import { Cloths, ColliderMeshes, ConstraintLines, type Detail, Mirror, People, reachOf, type ColliderMesh } from "@clothstream/three";
 import { Fingers } from "./fingers";
 import { useSoftShadows } from "./soft_shadow";
 import { Studio } from "./studio";
@@ -28,6 +28,7 @@ export class View {
   private readonly colliderMeshes = new ColliderMeshes();
   private readonly people = new People();
   private readonly constraints = new ConstraintLines();
+  private readonly mirror = new Mirror((on) => this.colliderMeshes.drawForMirror(on));
   drawsConstraints = false; // those that the newest report names
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
   private readonly cloths: Cloths;
@@ -58,7 +59,7 @@ export class View {
     this.renderer.toneMapping = THREE.AgXToneMapping;
     this.renderer.toneMappingExposure = 1.35;
     this.studio = new Studio(this.renderer, detail, (reflections) => this.colliderMeshes.reflect(reflections));
-    this.studio.scene.add(this.cloths.group, this.colliderMeshes.group, this.people.group, this.constraints.lines);
+    this.studio.scene.add(this.cloths.group, this.colliderMeshes.group, this.people.group, this.constraints.lines, this.mirror.group);
     this.orbit = new OrbitControls(this.camera, canvas);
     const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
     const damp = () => (this.orbit.enableDamping = !calm.matches);
@@ -126,6 +127,19 @@ export class View {
   // Shows the names of the participants. Call when they change.
   name(client: Client): void {
     this.people.name(client.people.participants());
+  }
+
+  // Hides the head of the own body, and puts a mirror before its wearer: `eyes` and `look` in the scene. "" for no body.
+  wear(body: string, eyes: THREE.Vector3, look: THREE.Vector3): void {
+    this.colliderMeshes.wear(body);
+    if (!body) return this.mirror.hide();
+    const direction = look.clone().setY(0);
+    if (direction.lengthSq() < 1e-6) direction.set(0, 0, -1);
+    this.mirror.stand(eyes.clone().setY(this.floorHeight), direction.normalize());
+  }
+
+  get hasMirror(): boolean {
+    return this.mirror.isShown;
   }
 
   // Whether a collider of this participant yielded in the last drawn frame.

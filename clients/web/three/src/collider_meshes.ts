@@ -27,11 +27,22 @@ export class ColliderMeshes {
   readonly group = new THREE.Group();
   readonly meshes: ColliderMesh[] = [];
   private reflections: THREE.Texture | null = null;
+  private worn = ""; // name of the own body
 
   // Sets the map that smooth colliders reflect.
   reflect(reflections: THREE.Texture): void {
     this.reflections = reflections;
     for (const { material } of this.meshes) material.envMap = reflections;
+  }
+
+  // Hides what is above the neck of the own body, which would be before the eyes; "" for none. Mirrors and shadows show it.
+  wear(name: string): void {
+    this.worn = name;
+  }
+
+  // Whether the scene is drawn for a mirror.
+  drawForMirror(on: boolean): void {
+    for (const mesh of this.meshes) showHead(mesh, on || mesh.name !== this.worn);
   }
 
   // Removes all meshes, because a new description brings new hulls.
@@ -57,6 +68,9 @@ export class ColliderMeshes {
       mesh.position.fromArray(collider.position);
       mesh.quaternion.fromArray(collider.orientation);
       if (collider.shape === Shape.hull) follow(mesh, client.frames.hullVertices(collider));
+      const isOwn = this.worn !== "" && collider.name === this.worn;
+      if (isOwn && mesh.userData["shown"] === undefined) sortByNeck(mesh, client, collider);
+      showHead(mesh, !isOwn);
       ++count;
     }
     while (this.meshes.length > count) this.remove(this.meshes.pop()!);
@@ -141,6 +155,33 @@ function taperedCapsule(radius: number, topRadius: number, length: number): THRE
   addArc(radius, -length / 2, -Math.PI / 2, touching);
   addArc(topRadius, length / 2, touching, Math.PI / 2);
   return new THREE.LatheGeometry(outline, 48);
+}
+
+// Puts the triangles below the neck first, so that the others can be left out. Hulls of few corners have no
+// index, and are drawn whole.
+function sortByNeck(mesh: ColliderMesh, client: Client, collider: Collider): void {
+  const { geometry } = mesh;
+  const below = client.wearing.belowNeck(collider.index);
+  mesh.userData["shown"] = geometry.index ? below.length : 0;
+  if (!geometry.index || below.length === 0) return;
+  const key = (corners: ArrayLike<number>, i: number) => `${corners[i]} ${corners[i + 1]} ${corners[i + 2]}`;
+  const known = new Set<string>();
+  for (let i = 0; i < below.length; i += 3) known.add(key(below, i));
+  const all = geometry.index.array;
+  const sorted = new Uint32Array(all.length);
+  sorted.set(below);
+  for (let i = 0, at = below.length; i < all.length; i += 3)
+    if (!known.has(key(all, i))) for (let k = 0; k < 3; ++k) sorted[at++] = all[i + k]!;
+  geometry.setIndex(new THREE.BufferAttribute(sorted, 1));
+  mesh.onBeforeShadow = () => geometry.setDrawRange(0, Infinity);
+  mesh.onAfterShadow = () => showHead(mesh, mesh.userData["head"] !== false);
+}
+
+function showHead(mesh: ColliderMesh, shows: boolean): void {
+  const below = mesh.userData["shown"] as number | undefined;
+  if (!below) return;
+  mesh.userData["head"] = shows;
+  mesh.geometry.setDrawRange(0, shows ? Infinity : below);
 }
 
 // Moves the vertices of a mesh with joints to where they are now.

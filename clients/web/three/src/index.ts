@@ -8,6 +8,7 @@ export { ConstraintLines } from "./constraint_lines";
 export { type Detail, tiled } from "./fabric_material";
 export { FanFigure, heldFan } from "./fan";
 export { fabricNames, fabricOf, type Fabric } from "./fabrics";
+export { Mirror } from "./mirror";
 export * from "./people";
 export { hash, noise } from "./weave";
 export { Body } from "./xr/body";
@@ -18,4 +19,5 @@ export { Grabber, newGrabId, type GrabPose, type Touchable } from "./xr/grabber"
 export { chooseRate, Immersion, type ImmersionListener, type Mode } from "./xr/immersion";
 export { Headset, type Doing, type HeadsetHost, type HeadsetListener } from "./xr/headset";
 export { Limb } from "./xr/limb";
+export { Wearer } from "./xr/wearer";
 export { Placement, TwoHandMove } from "./xr/placement";

@@ -51,15 +51,16 @@ export class People {
       const collider = colliders[index]!;
       const id = collider.participantId;
       if (id === 0n) continue;
-      const self = this.participants.get(id)?.self === true;
+      const participant = this.participants.get(id);
+      const self = participant?.self === true;
       this.ownYields ||= self && collider.yields;
       if (self && (collider.isHead || !showOwn)) continue;
+      if (collider.isHead) this.placeLabel(id, collider, eye);
+      // Head and hands are drawn as parts of the body.
+      if (participant?.body) continue;
       const figures = self ? this.own : this.others;
       figures.add(collider, collider.yields ? kYieldColour : colourOf(id));
-      if (collider.isHead) {
-        if (turned(collider)) figures.addVisor(collider);
-        this.placeLabel(id, collider, eye);
-      }
+      if (collider.isHead && turned(collider)) figures.addVisor(collider);
     }
     this.others.end();
     this.own.end();

@@ -13,7 +13,8 @@ const kMostLimbs = 8;
 
 export class Body {
   readonly head = new THREE.Vector3();
-  private readonly look = new THREE.Quaternion(); // of the head
+  // Orientation of the head in the scene.
+  readonly headOrientation = new THREE.Quaternion();
   private readonly turn = new THREE.Quaternion(); // from the room to the scene
   headPresent = false;
   private readonly rotation = new THREE.Matrix4();
@@ -57,8 +58,8 @@ export class Body {
       const { x, y, z } = viewer.transform.position;
       this.head.set(x, y, z).applyMatrix4(toScene);
       const { orientation } = viewer.transform;
-      this.look.set(orientation.x, orientation.y, orientation.z, orientation.w);
-      this.look.premultiply(this.turn.setFromRotationMatrix(this.rotation.extractRotation(toScene)));
+      this.headOrientation.set(orientation.x, orientation.y, orientation.z, orientation.w);
+      this.headOrientation.premultiply(this.turn.setFromRotationMatrix(this.rotation.extractRotation(toScene)));
     }
     this.limbOf.clear();
     for (const source of session.inputSources) this.limb(source);
@@ -121,7 +122,7 @@ export class Body {
   }
 
   private ownHead(scale: number): Head {
-    const { x, y, z, w } = this.look;
+    const { x, y, z, w } = this.headOrientation;
     return { position: this.head.toArray(), orientation: [x, y, z, w], radius: kHeadRadius / scale };
   }
 

@@ -10,6 +10,7 @@ import { HitTest } from "./hit_test";
 import { Immersion, type Mode } from "./immersion";
 import type { Limb } from "./limb";
 import { Placement, TwoHandMove } from "./placement";
+import { Wearer } from "./wearer";
 
 // Distance from the user to the front of the scene when it is placed, m.
 const kArmLength = 0.5;
@@ -52,6 +53,7 @@ export class Headset {
   doing: Doing = "touch";
   private readonly figures = new Figures();
   private readonly hitTest = new HitTest();
+  private readonly wearer = new Wearer();
   private readonly immersion: Immersion;
   private placed = false;
   private firstPoint: THREE.Vector3 | undefined;
@@ -128,6 +130,7 @@ export class Headset {
     if (client) {
       this.body.grab(client.frames, this.placement.scale);
       this.body.send(client.input, this.placement.scale);
+      this.wearer.send(client.wearing, this.body, frame, space, this.placement.inverse, this.placement.scale);
     }
     this.figures.place(this.body, this.placement.scale);
   }

@@ -76,7 +76,7 @@ export class Immersion {
 }
 
 function options(mode: Mode): XRSessionInit {
-  const optional = ["local-floor", "hand-tracking", "layers"];
+  const optional = ["local-floor", "hand-tracking", "body-tracking", "layers"];
   if (mode === "immersive-vr") return { optionalFeatures: optional };
   return {
     optionalFeatures: [...optional, "hit-test", "anchors", "depth-sensing"],
