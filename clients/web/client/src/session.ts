@@ -138,6 +138,8 @@ export class Session {
 
   // Sends what the program has set since the last call. Call after changes; once per drawn frame is enough.
   flush(): void {
+    // Meshes of surfaces are sent a few parts at a time.
+    this.client.update();
     for (let message = this.client.nextOutgoing(); message; message = this.client.nextOutgoing())
       this.post({ kind: "send", connection: this.connection, message }, [message.buffer]);
   }

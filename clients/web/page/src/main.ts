@@ -88,6 +88,7 @@ async function start(): Promise<void> {
       panel.noticed();
     },
     refused: (client) => {
+      if (headset.refused(client)) return;
       notify(client.errorText);
       if (client.errorText.startsWith("colliderPoses.winds")) putFanAway();
       panel.refused(client);

@@ -65,6 +65,8 @@ export interface HeadsetProbe {
   readonly isAnchored: boolean;
   readonly placement: number[]; // matrix from scene to room, column by column
   readonly shadowReach: number; // half the width of the shadow map in the room, m
+  // Surfaces of the real room: those that are drawn, and those that the server has.
+  readonly room: { detects: boolean; shares: boolean; detected: number; sent: number };
   // Chooses what the next presses do, like the panel in space. The one function of the probe that changes something.
   choose(doing: Doing): void;
   // The panel in space: its middle in the room, its picture, lines of text, and buttons with the places of their middles.
@@ -173,6 +175,7 @@ export function expose(session: Session, view: View, { headset, panel, work, his
         isAnchored: headset.isAnchored,
         placement: headset.placement.matrix.toArray(),
         shadowReach: view.shadowReach,
+        room: { detects: headset.realRoom.detects, shares: headset.realRoom.shares, ...headset.realRoom.counts },
         choose: (doing: Doing) => headset.do(doing),
         panel: {
           place: panel.mesh.getWorldPosition(new THREE.Vector3()).toArray(),

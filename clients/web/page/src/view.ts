@@ -80,9 +80,9 @@ export class View {
     return this.bounds;
   }
 
-  // Hides the drawn room, so that the real one is seen.
-  passThrough(on: boolean): void {
-    this.studio.passThrough(on);
+  // Hides the drawn room, so that the real one is seen. hasFloor: others draw shadows on its floor.
+  passThrough(on: boolean, hasFloor: boolean): void {
+    this.studio.passThrough(on, hasFloor);
   }
 
   get colliders(): readonly ColliderMesh[] {

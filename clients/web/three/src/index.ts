@@ -18,4 +18,7 @@ export { Grabber, newGrabId, type GrabPose, type Touchable } from "./xr/grabber"
 export { chooseRate, Immersion, type ImmersionListener, type Mode } from "./xr/immersion";
 export { Headset, type Doing, type HeadsetHost, type HeadsetListener } from "./xr/headset";
 export { Limb } from "./xr/limb";
+export { DetectedSurfaces, type DetectedSurface } from "./xr/detected_surfaces";
+export { RealRoom } from "./xr/real_room";
+export * from "./xr/room_mesh";
 export { Placement, TwoHandMove } from "./xr/placement";
