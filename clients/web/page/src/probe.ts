@@ -67,8 +67,10 @@ export interface HeadsetProbe {
   readonly shadowReach: number; // half the width of the shadow map in the room, m
   // Surfaces of the real room: those that are drawn, and those that the server has.
   readonly room: { detects: boolean; shares: boolean; detected: number; sent: number };
-  // Chooses what the next presses do, like the panel in space. The one function of the probe that changes something.
+  // Chooses what the next presses do, like the panel in space. The functions choose and press are those of the probe that change something.
   choose(doing: Doing): void;
+  // Presses a button of the panel in space by its text.
+  press(text: string): void;
   // The panel in space: its middle in the room, its picture, lines of text, and buttons with the places of their middles.
   readonly panel: {
     readonly place: Vec3;
@@ -177,6 +179,7 @@ export function expose(session: Session, view: View, { headset, panel, work, his
         shadowReach: view.shadowReach,
         room: { detects: headset.realRoom.detects, shares: headset.realRoom.shares, ...headset.realRoom.counts },
         choose: (doing: Doing) => headset.do(doing),
+        press: (text: string) => panel.pressText(text),
         panel: {
           place: panel.mesh.getWorldPosition(new THREE.Vector3()).toArray(),
           canvas: panel.canvas,
