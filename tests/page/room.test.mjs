@@ -218,3 +218,32 @@ test("a server that takes no surfaces is not offered any", async () => {
     await other.stop();
   }
 });
+
+test("with the policy everyone, others see the room, and the page says so before", async () => {
+  const other = await startServer(0, ["--scene-file", sceneFile, "--scene", "falling", "--room-surfaces", "everyone"]);
+  try {
+    const watcher = await openPage(browser, `${other.url}?name=Watcher`, { draws: false });
+    await untilState(watcher, "live");
+    await withHeadset({ url: other.url }, async (page) => {
+      await page.click("#enter-ar");
+      await untilText(page, "#room-who", /sends it to everyone who is in the scene "falling" or joins it/);
+      await page.keyboard.press("Escape");
+      await enter(page, "ar", "send");
+      await placeAtDesk(page);
+      await untilShared(page);
+      const { sent } = await page.evaluate(() => window.clothstream.headset.room);
+      await watcher.waitForFunction((wanted) => window.clothstream.roomSurfaces === wanted, sent);
+      // One that joins later gets them too.
+      const late = await openPage(browser, `${other.url}?name=Late`);
+      await late.waitForFunction((wanted) => window.clothstream?.roomSurfaces === wanted, sent);
+      await takePicture(late, "room_of_another");
+      await late.close();
+      assert.equal(await page.evaluate(() => window.clothstream.roomSurfaces), 0, "the own room is not drawn as that of another");
+      await page.evaluate(() => window.device.activeSession.end());
+      await watcher.waitForFunction(() => window.clothstream.roomSurfaces === 0);
+    });
+    await watcher.close();
+  } finally {
+    await other.stop();
+  }
+});

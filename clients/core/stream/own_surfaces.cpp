@@ -66,6 +66,12 @@ void OwnSurfaces::sendNothing() {
   nextPart_ = 0;
 }
 
+void OwnSurfaces::takeBack() {
+  if (!sends_) return;
+  sendNothing();
+  for (const OwnSurface& surface : surfaces_) orders_.push_back({surface.id, What::removal});
+}
+
 void OwnSurfaces::update(std::uint64_t nowUs) {
   if (left_ == kWindow || nowUs - openedUs_ < kWindowUs) return;
   openedUs_ = nowUs;

@@ -32,6 +32,11 @@ class OwnSurfaces {
   void sendAll();
   // The server takes none: nothing is sent until sendAll().
   void sendNothing();
+  // The program allows that they are sent, or no longer. The server has none then.
+  void allow() {
+    if (!sends_) sendAll();
+  }
+  void takeBack();
 
   void update(std::uint64_t nowUs);
   // Returns the next message, or nullptr. Valid until the next call of this function.

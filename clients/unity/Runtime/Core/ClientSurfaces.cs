@@ -12,9 +12,17 @@ namespace ClothStream.Core
             get { lock (Gate) return Native.cs_get_surface_policy(Handle); }
         }
 
+        /// <summary>Says how far the policy of the server may go for surfaces to be sent: Own (default) or Everyone. Ask the
+        /// user first.</summary>
+        public void AllowSurfaces(SurfacePolicy policy)
+        {
+            lock (Gate) Native.cs_allow_surfaces(Handle, (uint)policy);
+            Flush();
+        }
+
         /// <summary>Adds a surface, or replaces the one with its id. The mesh is copied, sent in parts, and sent again after a
-        /// reconnect. Returns false if the server takes no surfaces, or if there are no or too many triangles. The event Error
-        /// reports a refusal by the server.</summary>
+        /// reconnect. Returns false if the server takes no surfaces, if its policy goes further than AllowSurfaces says, or if
+        /// there are no or too many triangles. The event Error reports a refusal by the server.</summary>
         /// <param name="positions">x, y, z of each vertex, m, -100 to 100, in the frame of the surface.</param>
         /// <param name="triangles">Three vertices of each triangle, counter-clockwise seen from the front in the right-handed
         /// coordinates of the stream.</param>

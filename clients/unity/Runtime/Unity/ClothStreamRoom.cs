@@ -55,12 +55,16 @@ namespace ClothStream
             if (client != connection.Client)
                 foreach (RoomMesh mesh in known.Values) mesh.Forget();
             client = connection.Client;
-            if (share == RoomSharing.NoOne || client.SurfacePolicy != SurfacePolicy.Own)
+            SurfacePolicy policy = client.SurfacePolicy;
+            if (!IsAllowed(policy))
             {
-                Warn(share != RoomSharing.NoOne, "takes no surfaces of the real room, so that cloth passes through them.");
+                Warn(share != RoomSharing.NoOne, policy == SurfacePolicy.Everyone ? "sends the shape of the real room to everyone in the scene, which the user has not agreed to."
+                                                                                  : "takes no surfaces of the real room, so that cloth passes through them.");
                 TakeBack();
+                client.AllowSurfaces(SurfacePolicy.Own);
                 return;
             }
+            if (policy == SurfacePolicy.Everyone) client.AllowSurfaces(policy);
             meshes.GetComponentsInChildren(found);
             foreach (RoomMesh mesh in known.Values) mesh.IsPresent = false;
             bool takesAll = true;
@@ -79,6 +83,11 @@ namespace ClothStream
         {
             if (connection == null || client != connection.Client) known.Clear();
             else TakeBack();
+        }
+
+        bool IsAllowed(SurfacePolicy policy)
+        {
+            return policy == SurfacePolicy.Own ? share != RoomSharing.NoOne : policy == SurfacePolicy.Everyone && share == RoomSharing.Everyone;
         }
 
         void RemoveThoseThatAreGone()

@@ -8,6 +8,8 @@ namespace ClothStream
         /// <summary>It stays on this device, and cloth passes through the furniture.</summary>
         NoOne,
         /// <summary>The server gets it, uses it for the cloth, and sends it to no one.</summary>
-        Server
+        Server,
+        /// <summary>If the server sends it to everyone in the scene, they may get it too.</summary>
+        Everyone
     }
 }

@@ -86,7 +86,6 @@ export class HeadsetPage {
 
   // Call first in each frame of a session.
   draw(frame: XRFrame, now: number, client: Client | undefined): void {
-    this.room.watch();
     this.headset.update(frame, now, client);
     if (client) this.session.flush();
   }
@@ -94,6 +93,7 @@ export class HeadsetPage {
   // Updates the panel.
   show(): void {
     if (!this.headset.session) return;
+    this.room.watch();
     const { current } = this.failures;
     if (current && !current.quiet) return this.showFailure(current);
     this.isBefore = false;

@@ -30,6 +30,8 @@ export interface Probe {
   readonly colliders: Collider[];
   // Names of other participants that are drawn, and the places of their labels.
   readonly people: View["shownPeople"];
+  // Surfaces of the real rooms of others that are drawn.
+  readonly roomSurfaces: number;
   // Drawn positions of the scene's colliders.
   readonly drawnColliders: Vec3[];
   // Drawn vertices of the scene's colliders, in their frames.
@@ -140,6 +142,9 @@ export function expose(session: Session, view: View, { headset, panel, work, his
     },
     get people() {
       return view.shownPeople;
+    },
+    get roomSurfaces() {
+      return view.roomSurfaces;
     },
     get drawnColliders() {
       return view.colliders.map(({ position }) => position.toArray());

@@ -31,7 +31,7 @@ export class RoomSharing {
     dialog.showModal();
     await new Promise((done) => dialog.addEventListener("close", done, { once: true }));
     const { returnValue } = dialog;
-    if (returnValue === "send") this.agreedTo = to;
+    if (returnValue === "send") this.agree(to);
     return returnValue === "send" || returnValue === "keep" ? returnValue : undefined;
   }
 
@@ -44,13 +44,15 @@ export class RoomSharing {
   end(): void {
     this.hasAsked = false;
     this.agreedTo = undefined;
+    this.session.client.input.surfaces.allow(SurfacePolicy.own);
   }
 
-  // Stops to share when others would receive the shape than those to whom the user has agreed. Call often.
+  // Stops to share when others would receive the shape than those to whom the user has agreed. Until then the client sends
+  // nothing to them. Call often.
   watch(): void {
     if (!this.room().shares || this.session.state.kind !== "live" || this.agreedTo === this.receivers) return;
     this.stop();
-    if (this.isPossible) this.say("This scene may send the shape of your room to others. See Room.");
+    if (this.isPossible) this.say("Others would receive the shape of your room now, so it is taken back. See Room.");
   }
 
   // Whether an error is about a surface, and nothing that the user has to know.
@@ -83,13 +85,20 @@ export class RoomSharing {
   }
 
   private share(): void {
-    this.agreedTo = this.receivers;
+    this.agree(this.receivers);
     this.room().shares = true;
     this.changed();
   }
 
+  // A client that joins later is not allowed more than the server.
+  private agree(to: string): void {
+    this.agreedTo = to;
+    if (this.policy === SurfacePolicy.everyone) this.session.client.input.surfaces.allow(SurfacePolicy.everyone);
+  }
+
   private stop(): void {
     this.agreedTo = undefined;
+    this.session.client.input.surfaces.allow(SurfacePolicy.own);
     this.room().shares = false;
     this.changed();
   }
@@ -100,12 +109,15 @@ export class RoomSharing {
 
   private get isPossible(): boolean {
     const { client, state } = this.session;
-    return state.kind === "live" && this.policy === SurfacePolicy.own && Roles.get(client.people.role) !== "viewer";
+    return state.kind === "live" && this.policy >= SurfacePolicy.own && Roles.get(client.people.role) !== "viewer";
   }
 
   // Who receives the shape.
   private get receivers(): string {
+    const { client } = this.session;
     const server = `The server ${window.location.host} uses the shape for the cloth`;
-    return `${server}, and sends it to no one. It records and keeps nothing of it. Others see how the cloth lies.`;
+    const rest = "It records and keeps nothing of it.";
+    if (this.policy === SurfacePolicy.everyone) return `${server}, and sends it to everyone who is in the scene "${client.sceneName}" or joins it. ${rest}`;
+    return `${server}, and sends it to no one. ${rest} Others see how the cloth lies.`;
   }
 }

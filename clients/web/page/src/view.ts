@@ -4,7 +4,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Shape, type Client, type Vec3 } from "@clothstream/client";
-import { Cloths, ColliderMeshes, ConstraintLines, type Detail, People, reachOf, type ColliderMesh } from "@clothstream/three";
+import { Cloths, ColliderMeshes, ConstraintLines, type Detail, People, reachOf, RoomOutlines, type ColliderMesh } from "@clothstream/three";
 import { Fingers } from "./fingers";
 import { useSoftShadows } from "./soft_shadow";
 import { Studio } from "./studio";
@@ -27,6 +27,7 @@ export class View {
   private readonly studio: Studio;
   private readonly colliderMeshes = new ColliderMeshes();
   private readonly people = new People();
+  private readonly rooms = new RoomOutlines();
   private readonly constraints = new ConstraintLines();
   drawsConstraints = false; // those that the newest report names
   private readonly bounds = new THREE.Box3(new THREE.Vector3(-1, 0, -1), new THREE.Vector3(1, 2, 1));
@@ -58,7 +59,7 @@ export class View {
     this.renderer.toneMapping = THREE.AgXToneMapping;
     this.renderer.toneMappingExposure = 1.35;
     this.studio = new Studio(this.renderer, detail, (reflections) => this.colliderMeshes.reflect(reflections));
-    this.studio.scene.add(this.cloths.group, this.colliderMeshes.group, this.people.group, this.constraints.lines);
+    this.studio.scene.add(this.cloths.group, this.colliderMeshes.group, this.people.group, this.rooms.group, this.constraints.lines);
     this.orbit = new OrbitControls(this.camera, canvas);
     const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
     const damp = () => (this.orbit.enableDamping = !calm.matches);
@@ -107,6 +108,7 @@ export class View {
   describe(client: Client): void {
     this.cloths.describe(client);
     this.constraints.describe(client);
+    this.rooms.show(client);
     this.bounds.copy(this.cloths.reach());
     this.colliderMeshes.describe();
     for (const collider of client.frames.colliders()) {
@@ -126,6 +128,15 @@ export class View {
   // Shows the names of the participants. Call when they change.
   name(client: Client): void {
     this.people.name(client.people.participants());
+  }
+
+  // Shows the surfaces of the real rooms of others. Call when they change.
+  showRooms(client: Client): void {
+    this.rooms.show(client);
+  }
+  // Surfaces of the real rooms of others that are drawn.
+  get roomSurfaces(): number {
+    return this.rooms.count;
   }
 
   // Whether a collider of this participant yielded in the last drawn frame.

@@ -9,6 +9,7 @@ export { type Detail, tiled } from "./fabric_material";
 export { FanFigure, heldFan } from "./fan";
 export { fabricNames, fabricOf, type Fabric } from "./fabrics";
 export * from "./people";
+export { RoomOutlines } from "./room_outlines";
 export { hash, noise } from "./weave";
 export { Body } from "./xr/body";
 export { CanvasPanel } from "./xr/canvas_panel";
