@@ -143,6 +143,10 @@ std::uint32_t Client::receive(Bytes bytes, std::uint64_t nowUs, const cs_decoded
       return pairingCodeReceived(message->body);
     case Body::datagramAnswer:
       return datagramAnswerReceived(message->body);
+    case Body::roomSurfaces:
+      return roomSurfacesReceived(message->body);
+    case Body::getSurfacePart:
+      return roomSurfaces_.answered(message->requestId, message->body) ? CS_EVENT_SURFACES : 0;
     case Body::getScene:
     case Body::createScene:
     case Body::deleteScene:
@@ -162,6 +166,7 @@ void Client::update(std::uint64_t nowUs) {
   timer_.update(nowUs);
   requests_.update(nowUs);
   surfaces_.update(nowUs);
+  roomSurfaces_.update(nowUs);
   if (stream_.newest().isMirror() || !timer_.isWelcomed() || state_ == CS_STATE_FAILED ||
       !clock_.pingDue(nowUs))
     return;
@@ -205,26 +210,35 @@ std::uint32_t Client::welcomed(Bytes body, std::uint64_t nowUs) {
   if (inherited || (returned && posed_)) sendPoses(nowUs);
   // A server that has forgotten this participant has given its body back.
   if (returned && worn_ && participants_.bodyOf(welcome_.participantId) != worn_->collider()) sendWearing();
-  const std::uint32_t events =
-      (participants_.all().empty() ? 0u : std::uint32_t{CS_EVENT_PARTICIPANTS}) | sendSurfaces(resumed_);
+  const std::uint32_t events = (participants_.all().empty() ? 0u : std::uint32_t{CS_EVENT_PARTICIPANTS}) |
+                               (roomSurfaces_.forget() ? std::uint32_t{CS_EVENT_SURFACES} : 0u) |
+                               sendSurfaces(resumed_);
   if (!known) return events;
   state_ = CS_STATE_JOINED;
   redirection_.joined();
   return events | CS_EVENT_RETURNED;
 }
 
+bool Client::maySendSurfaces() const {
+  return welcome_.surfacePolicy == CS_SURFACES_OWN ||
+         (welcome_.surfacePolicy == CS_SURFACES_EVERYONE && allowedSurfaces_ == CS_SURFACES_EVERYONE);
+}
+
 std::uint32_t Client::sendSurfaces(bool mayHaveOthers) {
-  if (welcome_.surfacePolicy == CS_SURFACES_OWN) {
+  if (maySendSurfaces()) {
     surfaces_.sendAll(mayHaveOthers);
     return 0;
   }
-  surfaces_.sendNothing();
+  surfaces_.sendNothing(mayHaveOthers && welcome_.surfacePolicy == CS_SURFACES_EVERYONE);
   if (surfaces_.empty()) return 0;
   error_ = {
       .code = 0,
       .text = welcome_.surfacePolicy == CS_SURFACES_OFF
                   ? "The server takes no surfaces of the real room (--room-surfaces off), so that cloth "
                     "passes through yours."
+              : welcome_.surfacePolicy == CS_SURFACES_EVERYONE
+                  ? "The server sends surfaces of the real room to everyone in the scene (--room-surfaces "
+                    "everyone), which the program does not allow, so that cloth passes through yours."
                   : "The server is of a release that knows no surfaces of the real room, so that cloth "
                     "passes through yours. Update the server.",
       .fatal = false,
@@ -346,6 +360,7 @@ std::uint32_t Client::errorReceived(Bytes body, std::uint64_t requestId, std::ui
     if (datagrams_.refused(requestId)) return CS_EVENT_DATAGRAMS;
     // Pieces that were under way when the server refused an upload are refused as well.
     if (requests_.isOfEndedUpload(requestId)) return 0;
+    if (roomSurfaces_.refused(requestId, error->code == field::ErrorCode::kRateLimited)) return 0;
     if (requests_.refused(requestId, *error) == Requests::Outcome::answered) return CS_EVENT_ANSWER;
   }
   if (!error->fatal ||
@@ -410,6 +425,12 @@ std::uint32_t Client::datagramAnswerReceived(Bytes body) {
   return datagrams_.answered(std::move(*answer)) ? CS_EVENT_DATAGRAMS : 0;
 }
 
+std::uint32_t Client::roomSurfacesReceived(Bytes body) {
+  const std::optional<std::vector<RoomSurfaceEntry>> entries = readRoomSurfaces(body);
+  if (!entries) return failMalformed("RoomSurfaces");
+  return roomSurfaces_.listed(*entries, welcome_.participantId) ? CS_EVENT_SURFACES : 0;
+}
+
 std::uint32_t Client::playbackReceived(Bytes body, std::uint64_t nowUs) {
   const std::optional<cs_playback> playback = readPlayback(body);
   if (!playback) return failMalformed("Playback");
@@ -433,6 +454,7 @@ const std::string* Client::nextOutgoing() {
   const std::string* message = outbox_.next();
   if (!message && isConnected()) message = requests_.nextOfUpload();
   if (!message && timer_.isWelcomed() && mayCollide()) message = surfaces_.next();
+  if (!message && timer_.isWelcomed()) message = roomSurfaces_.next(requests_.lastId());
   // Attachments and joints stay where they were moved, so each pose is sent once.
   if (outbox_.poses().empty() && isConnected() && mayCollide()) {
     poses_.attachments.clear();

@@ -22,6 +22,7 @@
 #include "clients/core/stream/received_stream.h"
 #include "clients/core/stream/redirection.h"
 #include "clients/core/stream/requests.h"
+#include "clients/core/stream/room_surfaces.h"
 #include "clients/core/stream/server_clock.h"
 #include "clients/core/wire/client_message.h"
 #include "clients/core/wire/limits.h"
@@ -82,6 +83,10 @@ class Client {
   // Returns false if the server of the scene takes no surfaces.
   bool setSurface(OwnSurface surface);
   OwnSurfaces& surfaces() { return surfaces_; }
+  // Sets the widest policy under which surfaces are sent.
+  void allowSurfaces(std::uint32_t policy);
+  void followSurfaces(bool on) { roomSurfaces_.follow(on); }
+  const RoomSurfaces& roomSurfaces() const { return roomSurfaces_; }
   void change(const ParameterChange& change);
   void changeCollider(std::string_view collider, const cs_collider_change& change);
   void listScenes();
@@ -162,9 +167,12 @@ class Client {
   bool isConnected() const { return state_ != CS_STATE_RECONNECTING || timer_.isWelcomed(); }
   bool mayCollide() const;
   std::uint32_t welcomed(Bytes body, std::uint64_t nowUs);
-  // Sends surfaces of the real room to a server that takes them. Returns CS_EVENT_ERROR if it takes none.
+  // Whether the policy of the server permits surfaces, and goes no further than the program allows.
+  bool maySendSurfaces() const;
+  // Sends surfaces of the real room if it may. Returns CS_EVENT_ERROR if there are some and it may not.
   // `mayHaveOthers`: OwnSurfaces::sendAll().
   std::uint32_t sendSurfaces(bool mayHaveOthers);
+  std::uint32_t roomSurfacesReceived(Bytes body);
   std::uint32_t presenceReceived(Bytes body, std::uint64_t nowUs);
   std::uint32_t chunkReceived(Bytes body);
   std::uint32_t described();
@@ -216,6 +224,8 @@ class Client {
   std::optional<body::WornBody> worn_;
   std::uint64_t wearRequest_ = 0;  // newest one for a body
   OwnSurfaces surfaces_;
+  std::uint32_t allowedSurfaces_ = CS_SURFACES_OWN;
+  RoomSurfaces roomSurfaces_;  // of others
   Display display_;
   std::vector<SceneSummary> scenes_;
   Requests requests_;

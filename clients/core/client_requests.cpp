@@ -169,9 +169,18 @@ bool Client::moveBody(const body::Tracked& tracked, std::uint64_t nowUs) {
 }
 
 bool Client::setSurface(OwnSurface surface) {
-  if (timer_.isWelcomed() && welcome_.surfacePolicy != CS_SURFACES_OWN) return false;
+  if (timer_.isWelcomed() && !maySendSurfaces()) return false;
   surfaces_.set(std::move(surface));
   return true;
+}
+
+void Client::allowSurfaces(std::uint32_t policy) {
+  allowedSurfaces_ = policy;
+  if (!timer_.isWelcomed()) return;
+  if (maySendSurfaces())
+    surfaces_.allow();
+  else
+    surfaces_.takeBack();
 }
 
 bool Client::mayCollide() const {

@@ -86,7 +86,8 @@ enum {
   CS_EVENT_PAIRING_CODE = 16384, /* cs_get_pairing_code */
   CS_EVENT_ANSWER = 32768,       /* cs_get_answer: a request about scenes succeeded or failed */
   CS_EVENT_MOVING = 65536,       /* cs_next_server: the scene moves there soon */
-  CS_EVENT_DATAGRAMS = 131072    /* cs_get_datagram_answer: the server has answered an offer */
+  CS_EVENT_DATAGRAMS = 131072,   /* cs_get_datagram_answer: the server has answered an offer */
+  CS_EVENT_SURFACES = 262144     /* cs_room_surface_count: surfaces of others have changed */
 };
 
 /* Values of cs_error_code after which the program asks its user for a token or a pairing code. */
@@ -625,8 +626,25 @@ typedef struct cs_surface {
 typedef enum cs_surface_policy {
   CS_SURFACES_UNKNOWN = 0, /* not connected yet, or the server is of a release that knows none */
   CS_SURFACES_OFF = 1,     /* it refuses them */
-  CS_SURFACES_OWN = 2      /* they act on the cloth, and their shape is sent to no client */
+  CS_SURFACES_OWN = 2,     /* they act on the cloth, and their shape is sent to no client */
+  CS_SURFACES_EVERYONE = 3 /* they act on the cloth, and everyone in the scene gets their shape */
 } cs_surface_policy;
+
+#define CS_ROOM_SURFACE_VERSION 1u
+/* Surface of the real room of another participant. The arrays are valid until the next CS_EVENT_SURFACES. */
+typedef struct cs_room_surface {
+  uint32_t version CS_INIT(CS_ROOM_SURFACE_VERSION);
+  uint32_t id; /* unique for its participant */
+  uint64_t participant_id;
+  uint64_t revision; /* differs from that of every other mesh of the scene */
+  float position[3];
+  float orientation[4];   /* quaternion x y z w */
+  const float* positions; /* x, y, z of each vertex, in the frame of the surface */
+  uint32_t vertex_count;
+  const uint32_t* triangles; /* three vertices of each triangle, counter-clockwise seen from the front */
+  uint32_t triangle_count;
+  uint32_t two_sided; /* 1: cloth can be on both sides */
+} cs_room_surface;
 
 /* HandSide of session.proto. */
 typedef enum cs_hand_side { CS_HAND_LEFT = 1, CS_HAND_RIGHT = 2 } cs_hand_side;
@@ -763,10 +781,15 @@ const uint32_t* cs_body_below_neck(const cs_client* client, uint32_t collider,
 
 /* Returns the policy of the server for surfaces of the real room, from the newest Welcome. */
 cs_surface_policy cs_get_surface_policy(const cs_client* client) CS_NOEXCEPT;
+/* Says how far the policy of the server may go for surfaces to be sent: CS_SURFACES_OWN (default), or
+ * CS_SURFACES_EVERYONE. The shape of a home is private: ask the user first. If it may go less far than
+ * before, the server is asked to remove the surfaces that it has; if it may go further, they are sent. */
+void cs_allow_surfaces(cs_client* client, uint32_t policy) CS_NOEXCEPT;
 /* Adds a surface of the real room, or replaces the one with its id. The mesh is copied, and sent again after
  * a reconnect. It acts when it has arrived completely; until then the former one does. Fails, and changes
  * nothing, if the version is unknown, if a count is not allowed, or if the client is in a scene whose server
- * takes no surfaces. If the client joins such a scene later, CS_EVENT_ERROR says so. */
+ * takes no surfaces, or whose policy goes further than cs_allow_surfaces says. If the client joins such a
+ * scene later, CS_EVENT_ERROR says so. */
 int cs_set_surface(cs_client* client, const cs_surface* surface) CS_NOEXCEPT;
 /* Moves a surface, which stands in its new pose from the next tick on. orientation4 may be NULL: no rotation.
  * Fails if there is no surface with this id. */
@@ -774,6 +797,13 @@ int cs_move_surface(cs_client* client, uint32_t id, const float* position3,
                     const float* orientation4) CS_NOEXCEPT;
 /* Removes a surface. Fails if there is no surface with this id. */
 int cs_remove_surface(cs_client* client, uint32_t id) CS_NOEXCEPT;
+
+/* Gets the surfaces of others, if the policy of the server is CS_SURFACES_EVERYONE. Default: off. */
+void cs_follow_surfaces(cs_client* client, int on) CS_NOEXCEPT;
+/* Number of surfaces of others whose meshes have arrived. */
+uint32_t cs_room_surface_count(const cs_client* client) CS_NOEXCEPT;
+/* Fails if the index is out of range or the version is unknown. */
+int cs_get_room_surface(const cs_client* client, uint32_t index, cs_room_surface* out) CS_NOEXCEPT;
 
 /* Number of events in the newest CS_EVENT_GRABS, for the grabs of all participants. */
 uint32_t cs_grab_event_count(const cs_client* client) CS_NOEXCEPT;

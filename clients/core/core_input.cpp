@@ -102,8 +102,12 @@ void cs_move_joints(cs_client* client, const char* collider, const float* poses,
 
 cs_surface_policy cs_get_surface_policy(const cs_client* client) noexcept {
   const std::uint32_t policy = client->client.welcome().surfacePolicy;
-  return policy == CS_SURFACES_OFF || policy == CS_SURFACES_OWN ? static_cast<cs_surface_policy>(policy)
-                                                                : CS_SURFACES_UNKNOWN;
+  return policy >= CS_SURFACES_OFF && policy <= CS_SURFACES_EVERYONE ? static_cast<cs_surface_policy>(policy)
+                                                                     : CS_SURFACES_UNKNOWN;
+}
+
+void cs_allow_surfaces(cs_client* client, uint32_t policy) noexcept {
+  client->client.allowSurfaces(policy);
 }
 
 int cs_set_surface(cs_client* client, const cs_surface* surface) noexcept {
@@ -133,6 +137,31 @@ int cs_move_surface(cs_client* client, uint32_t id, const float* position3,
 
 int cs_remove_surface(cs_client* client, uint32_t id) noexcept {
   return client->client.surfaces().remove(id) ? 1 : 0;
+}
+
+void cs_follow_surfaces(cs_client* client, int on) noexcept {
+  client->client.followSurfaces(on != 0);
+}
+
+uint32_t cs_room_surface_count(const cs_client* client) noexcept {
+  return static_cast<std::uint32_t>(client->client.roomSurfaces().complete().size());
+}
+
+int cs_get_room_surface(const cs_client* client, uint32_t index, cs_room_surface* out) noexcept {
+  const auto& all = client->client.roomSurfaces().complete();
+  if (index >= all.size() || out->version != CS_ROOM_SURFACE_VERSION) return 0;
+  const auto& [entry, mesh, nextPart, isBroken] = *all[index];
+  out->id = entry.id;
+  out->participant_id = entry.participant;
+  out->revision = entry.revision;
+  std::copy(entry.position.begin(), entry.position.end(), std::begin(out->position));
+  std::copy(entry.orientation.begin(), entry.orientation.end(), std::begin(out->orientation));
+  out->positions = mesh.positions.data();
+  out->vertex_count = entry.vertices;
+  out->triangles = mesh.triangles.data();
+  out->triangle_count = entry.triangles;
+  out->two_sided = entry.twoSided ? 1 : 0;
+  return 1;
 }
 
 uint32_t cs_grab_event_count(const cs_client* client) noexcept {

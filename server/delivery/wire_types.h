@@ -21,6 +21,8 @@ class CreatePairingCodeResponse;
 class Frame;
 class GetSceneRequest;
 class GetSceneResponse;
+class GetSurfacePartRequest;
+class GetSurfacePartResponse;
 class Hello;
 class LiftBanRequest;
 class LiftBanResponse;

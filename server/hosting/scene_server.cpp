@@ -136,6 +136,7 @@ void SceneServer::checkPeers(const std::stop_token& stop) {
     if (stop.stop_requested()) return;
     scene->roster.expire(Clock::now());
     scene->poses.divideRoom(Clock::now());
+    if (options.roomSurfaces == SurfacePolicy::everyone) scene->announceSurfaces();
   }
 }
 

@@ -40,8 +40,8 @@ inline constexpr std::uint32_t kMaxParticipants =
     messages::limits::kMaxParticipantColliders;
 
 // Policy for surfaces of the real rooms of participants: the server refuses them, or they act on the
-// cloth and their shapes are sent to no client.
-enum class SurfacePolicy : std::uint8_t { off, own };
+// cloth and their shapes are sent to no client, or to everyone in the scene.
+enum class SurfacePolicy : std::uint8_t { off, own, everyone };
 
 struct ServerOptions : Limits {
   vulkan::DeviceOptions device;

@@ -130,8 +130,10 @@ std::string toText(const scene::Permissions& permissions) {
   return words.empty() ? "none" : fmt::format("{}", fmt::join(words, ","));
 }
 
-const std::map<std::string, hosting::SurfacePolicy> kSurfacePolicies{{"off", hosting::SurfacePolicy::off},
-                                                                     {"own", hosting::SurfacePolicy::own}};
+const std::map<std::string, hosting::SurfacePolicy> kSurfacePolicies{
+    {"off", hosting::SurfacePolicy::off},
+    {"own", hosting::SurfacePolicy::own},
+    {"everyone", hosting::SurfacePolicy::everyone}};
 
 void addParticipantOptions(OptionTable& table, Parsed& parsed) {
   ServeOptions& options = parsed.options.serve;
@@ -165,7 +167,7 @@ void addParticipantOptions(OptionTable& table, Parsed& parsed) {
   CLI::Option* surfaces = table.choice(
       "--room-surfaces", parsed.roomSurfaces, kSurfacePolicies,
       "Surfaces of the real rooms of participants: own lets them act on the cloth of their scene and sends "
-      "their shape to no client, off refuses them");
+      "their shape to no client, everyone also sends it to all in the scene, off refuses them");
   table.showDefault(surfaces, "own");
   parsed.ownersAloneOption =
       table.flag("--owners-alone", parsed.ownersAlone,

@@ -15,6 +15,7 @@
 #include "server/messages/description.h"
 #include "server/messages/limits.h"
 #include "server/messages/scene_message.h"
+#include "server/scene/shared_surfaces.h"
 
 namespace clothstream::scene {
 namespace {
@@ -213,6 +214,11 @@ delivery::SharedBytes workNotice(const LiveScene& scene, std::uint64_t tick) {
           scene.start().streamRate / work.frameDivisor, scene.start().streamRate, work.substeps,
           all.substeps),
       tick);
+}
+
+void LiveScene::announceSurfaces() {
+  if (const delivery::SharedBytes list = surfaceList(surfaces, announcedSurfaces_))
+    subscribers.announceHere(list);
 }
 
 delivery::SharedBytes pausedNotice(const LiveScene& scene, std::uint64_t participant) {

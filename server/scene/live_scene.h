@@ -128,6 +128,10 @@ class LiveScene {
   // change.
   std::shared_ptr<const delivery::DescriptionChunks> description();
 
+  // Tells the subscribers that are connected to this server which surfaces of real rooms there are, if that
+  // has changed since the last call. Belongs to one thread. Recordings and other servers get nothing of it.
+  void announceSurfaces();
+
   // Counts a change of parameters, a pause or a reset by this participant, 0 for peers outside the scene, or
   // returns why there are too many (ChangeLimits). `call` begins the text.
   messages::Result<void> countChange(std::uint64_t participant, const char* call) {
@@ -166,6 +170,8 @@ class LiveScene {
   mutable std::mutex mutex_;
   std::shared_ptr<const Restored> restored_;
   Quarantine quarantine_;
+
+  std::uint64_t announcedSurfaces_ = 0;  // version of `surfaces` in the newest announceSurfaces()
 
   std::optional<Clock::time_point> emptySince_;  // of the newest call of hasBeenEmptyFor()
   std::unique_ptr<SceneObserver> observer_;

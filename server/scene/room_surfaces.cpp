@@ -190,6 +190,7 @@ messages::Result<void> RoomSurfaces::put(const Ticket& ticket, simulation::Share
     return charged;
   }
   entry->nextPose.reset();
+  entry->revision = ticket.number;
   if (owner->present) changed();
   return {};
 }
@@ -256,9 +257,19 @@ bool RoomSurfaces::take(std::uint64_t& version, std::vector<RoomSurface>& surfac
   for (const Owner& owner : owners_) {
     if (!owner.present) continue;
     for (const Entry& entry : owner.entries)
-      if (entry.placed) surfaces.push_back({owner.participant, entry.id, *entry.placed});
+      if (entry.placed) surfaces.push_back({owner.participant, entry.id, *entry.placed, entry.revision});
   }
   return true;
+}
+
+std::optional<RoomSurface> RoomSurfaces::find(std::uint64_t participant, std::uint32_t id,
+                                              std::uint64_t revision) const {
+  const std::lock_guard lock(mutex_);
+  const auto owner = std::ranges::find(owners_, participant, &Owner::participant);
+  if (owner == owners_.end() || !owner->present) return std::nullopt;
+  const auto entry = std::ranges::find(owner->entries, id, &Entry::id);
+  if (entry == owner->entries.end() || !entry->placed || entry->revision != revision) return std::nullopt;
+  return RoomSurface{participant, id, *entry->placed, revision};
 }
 
 }  // namespace clothstream::scene

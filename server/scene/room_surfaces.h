@@ -22,6 +22,7 @@ struct RoomSurface {
   std::uint64_t participant = 0;
   std::uint32_t id = 0;
   simulation::PlacedSurface placed;
+  std::uint64_t revision = 0;  // of the mesh; differs from that of all others of the scene
 };
 
 // Thread-safe. Endpoints and the thread that makes surfaces put them here; the device's thread takes them.
@@ -71,6 +72,8 @@ class RoomSurfaces {
   // Replaces `surfaces` by those that act, ordered by participant and id, and returns true, if they have
   // changed since the call that set `version`. A version of 0 always differs.
   bool take(std::uint64_t& version, std::vector<RoomSurface>& surfaces) const;
+  // A surface that acts and has this mesh; nothing if it is gone.
+  std::optional<RoomSurface> find(std::uint64_t participant, std::uint32_t id, std::uint64_t revision) const;
 
  private:
   struct Entry {
@@ -78,6 +81,7 @@ class RoomSurfaces {
     std::uint64_t number = 0;                         // of the newest mesh that has begun
     std::optional<model::Pose> nextPose = {};         // of a mesh that has begun
     std::optional<simulation::PlacedSurface> placed;  // absent: no mesh is complete
+    std::uint64_t revision = 0;                       // of `placed`: its `number`
   };
   struct Owner {
     std::uint64_t participant = 0;

@@ -14,6 +14,7 @@
 #include "server/hosting/scene_server.h"
 #include "server/messages/client_message.h"
 #include "server/scene/remote_session.h"
+#include "server/scene/shared_surfaces.h"
 #include "server/session/session.h"
 #include "server/telemetry/log.h"
 
@@ -149,6 +150,11 @@ void Session::tellPresentState(scene::LiveScene& scene) {
   if (scene.paused) mailbox_->announce(scene::pausedNotice(scene));
   if (!scene.source && scene.work.load() != scene.allWork())
     mailbox_->announce(scene::workNotice(scene, scene.tick));
+  if (surfaceLimits().policy() == v1::SURFACE_POLICY_EVERYONE && !mailbox_->atEdge()) {
+    std::uint64_t none = 0;
+    if (delivery::SharedBytes list = scene::surfaceList(scene.surfaces, none))
+      mailbox_->announce(std::move(list));
+  }
   if (scene.source) {
     if (delivery::SharedBytes playback = scene::playbackMessage(*scene.source))
       mailbox_->announce(std::move(playback));

@@ -18,6 +18,7 @@ enum class Rate : std::uint8_t {
   queries,
   control,
   surfaces,
+  surfaceParts,
   messages,  // of all kinds
   offences,  // refused messages, by their cost
   errors,    // Error messages; further refusals are only counted
@@ -33,6 +34,7 @@ inline constexpr std::array<schedule::TokenBucket, static_cast<std::size_t>(Rate
     {20, 20},     // queries
     {10, 10},     // control
     {200, 400},   // surfaces: parts of meshes, which are many after joining, and poses
+    {100, 100},   // surfaceParts: of others
     {1000, 500},  // messages
     {100, 500},   // offences
     {50, 50},     // errors

@@ -16,6 +16,7 @@
 #include "server/hosting/scene_server.h"
 #include "server/messages/client_message.h"
 #include "server/messages/surface_message.h"
+#include "server/scene/shared_surfaces.h"
 #include "server/session/session.h"
 
 namespace clothstream::session {
@@ -153,6 +154,10 @@ struct Session::Messages {
          .state = State::inScene,
          .limit = RateLimit{Rate::surfaces, "messages about surfaces"},
          .handle = surface},
+        {.body = Message::kGetSurfacePart,
+         .state = State::inScene,
+         .limit = RateLimit{Rate::surfaceParts, "requests for surfaces"},
+         .handle = getSurfacePart},
         {.body = Message::kSetRole, .state = State::inScene, .limit = kParticipants, .handle = setRole},
         {.body = Message::kRemoveParticipant,
          .state = State::inScene,
@@ -292,7 +297,7 @@ struct Session::Messages {
 
   static void surface(Session& session, const Message& message) {
     scene::LiveScene& scene = *session.scene_;
-    if (session.surfaceLimits().policy() != v1::SURFACE_POLICY_OWN)
+    if (session.surfaceLimits().policy() == v1::SURFACE_POLICY_OFF)
       return session.refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
                              scene.source
                                  ? fmt::format("surface: '{}' is not simulated, so that no surface acts "
@@ -316,6 +321,15 @@ struct Session::Messages {
     if (!update->part)
       return session.refuseUnless(scene.surfaces.move(session.participant_, update->id, *update->pose));
     session.refuseUnless(session.surfacePart(*update, message.surface().part()));
+  }
+
+  static void getSurfacePart(Session& session, const Message& message) {
+    if (session.surfaceLimits().policy() != v1::SURFACE_POLICY_EVERYONE)
+      return session.refuse({v1::ERROR_CODE_NOT_FOUND,
+                             "getSurfacePart: this server sends no surfaces of the real rooms of others "
+                             "(--room-surfaces everyone)"});
+    reply(session, scene::surfacePart(session.scene_->surfaces, message.get_surface_part()),
+          &v1::ServerMessage::mutable_get_surface_part);
   }
 
   static void parameterChange(Session& session, const Message& message) {
@@ -450,7 +464,9 @@ v1::SurfaceLimits Session::surfaceLimits() const {
     limits.set_policy(v1::SURFACE_POLICY_OFF);
     return limits;
   }
-  limits.set_policy(v1::SURFACE_POLICY_OWN);
+  limits.set_policy(server_.options.roomSurfaces == hosting::SurfacePolicy::everyone
+                        ? v1::SURFACE_POLICY_EVERYONE
+                        : v1::SURFACE_POLICY_OWN);
   limits.set_max_triangles(model::kMaxSurfaceTriangles);
   limits.set_max_surfaces(model::kMaxSurfacesOfParticipant);
   return limits;

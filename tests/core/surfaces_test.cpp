@@ -229,7 +229,8 @@ TEST_F(Surfaces, SayClearlyThatAServerTakesNone) {
     cs_surface_policy seen;
     const char* text;
   } servers[] = {{v1::SURFACE_POLICY_UNSPECIFIED, CS_SURFACES_UNKNOWN, "knows no surfaces of the real room"},
-                 {v1::SURFACE_POLICY_OFF, CS_SURFACES_OFF, "--room-surfaces off"}};
+                 {v1::SURFACE_POLICY_OFF, CS_SURFACES_OFF, "--room-surfaces off"},
+                 {v1::SURFACE_POLICY_EVERYONE, CS_SURFACES_EVERYONE, "which the program does not allow"}};
   join(v1::SURFACE_POLICY_OWN);
   for (const auto& one : servers) {
     set(1);
@@ -243,6 +244,32 @@ TEST_F(Surfaces, SayClearlyThatAServerTakesNone) {
     reconnect(v1::SURFACE_POLICY_OWN);
     EXPECT_THAT(allSent(), ElementsAre("1 0/2", "1 1/2"));
   }
+}
+
+TEST_F(Surfaces, GoToEveryoneOnlyIfTheProgramAllowsIt) {
+  cs_allow_surfaces(client.get(), CS_SURFACES_EVERYONE);
+  ASSERT_EQ(set(1), 1);
+  join(v1::SURFACE_POLICY_EVERYONE);
+  EXPECT_THAT(allSent(), ElementsAre("1 0/2", "1 1/2"));
+  // Taken back, and sent again.
+  cs_allow_surfaces(client.get(), CS_SURFACES_OWN);
+  EXPECT_THAT(allSent(), ElementsAre("only"));
+  EXPECT_EQ(set(2), 0);
+  EXPECT_THAT(allSent(), IsEmpty());
+  cs_allow_surfaces(client.get(), CS_SURFACES_EVERYONE);
+  EXPECT_THAT(allSent(), ElementsAre("only 1", "1 0/2", "1 1/2"));
+  // Taken back without a connection.
+  cs_disconnected(client.get(), now);
+  cs_allow_surfaces(client.get(), CS_SURFACES_OWN);
+  reconnect(v1::SURFACE_POLICY_EVERYONE, true);
+  EXPECT_THAT(allSent(), ElementsAre("only"));
+  cs_allow_surfaces(client.get(), CS_SURFACES_EVERYONE);
+  allSent();
+  // A server that sends them to no client has them in any case.
+  reconnect(v1::SURFACE_POLICY_OWN);
+  EXPECT_THAT(allSent(), ElementsAre("1 0/2", "1 1/2"));
+  cs_allow_surfaces(client.get(), CS_SURFACES_OWN);
+  EXPECT_THAT(allSent(), IsEmpty());
 }
 
 TEST_F(Surfaces, RefuseWhatNoServerTakes) {

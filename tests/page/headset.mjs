@@ -9,14 +9,17 @@ const kRuntime = packageFile("iwer/build/iwer.min.js");
 const kRoom = packageFile("@iwer/sem/build/iwer-sem.min.js");
 const kCapture = packageFile("@iwer/sem/captures/office_small.json");
 
-// Opens a page whose browser has a headset. `room` adds a real room with surfaces.
+// Opens a page whose browser has a headset. `room` adds a real room with surfaces. turned: the headset has another origin
+// and direction than others in that room (otherOrigin).
 // `prepare` runs in the page before its own scripts. Pages do not share a context.
-export async function openHeadset(browser, url, { room = false, input = "hand", viewport = { width: 640, height: 360 }, prepare } = {}) {
+export async function openHeadset(browser, url, { room = false, turned = false, input = "hand", viewport = { width: 640, height: 360 }, prepare } = {}) {
   const context = await browser.newContext({ viewport });
   await context.addInitScript({ path: kRuntime });
   if (room) {
     await context.addInitScript({ path: kRoom });
-    await context.addInitScript(`window.captured = ${await readFile(kCapture, "utf8")}`);
+    const captured = JSON.parse(await readFile(kCapture, "utf8"));
+    if (turned) for (const { locatable_META: pose } of captured.spatialEntities) turn(pose);
+    await context.addInitScript(`window.captured = ${JSON.stringify(captured)}`);
   }
   await context.addInitScript((primary) => {
     const { XRDevice, metaQuest3 } = window.IWER;
@@ -42,10 +45,24 @@ export async function openHeadset(browser, url, { room = false, input = "hand", 
   return page;
 }
 
-// Enters a mode by its button, and waits until frames are drawn.
-export async function enter(page, mode) {
+// Where a point of the room is for a headset that is `turned`.
+export const otherOrigin = ([x, y, z]) => [z + 0.7, y, -x + 0.2];
+
+function turn(pose) {
+  const { position } = pose;
+  const { x, y, z, w } = pose.orientation;
+  [position.x, position.y, position.z] = otherOrigin([position.x, position.y, position.z]);
+  // A quarter turn about y before the orientation.
+  const s = Math.SQRT1_2;
+  pose.orientation = { x: s * (x + z), y: s * (y + w), z: s * (z - x), w: s * (w - y) };
+}
+
+// Enters a mode by its button, and waits until frames are drawn. `shape` answers whether the shape of the real room may be
+// sent: send or keep.
+export async function enter(page, mode, shape = "keep") {
   const before = await page.evaluate(() => window.clothstream.headset.frames);
   await page.click(`#enter-${mode}`);
+  if (mode === "ar") await page.click(`#room button[value="${shape}"]`);
   await page.waitForFunction((count) => window.clothstream.headset.frames > count + 3, before);
 }
 

@@ -316,6 +316,13 @@ class Streams(unittest.TestCase):
             self.assertEqual(stream.surface_policy, clothstream.SurfacePolicy.OFF)
             with self.assertRaisesRegex(RuntimeError, "takes no surfaces"):
                 stream.set_surface(floor)
+        with running_server("--room-surfaces", "everyone") as address, clothstream.join(address) as stream:
+            stream.next_frame()
+            self.assertEqual(stream.surface_policy, clothstream.SurfacePolicy.EVERYONE)
+            with self.assertRaisesRegex(RuntimeError, "allow_surfaces"):
+                stream.set_surface(floor)
+            stream.allow_surfaces(clothstream.SurfacePolicy.EVERYONE)
+            stream.set_surface(floor)
 
     def test_joining_says_why_it_fails(self):
         with self.assertRaisesRegex(ValueError, "HOST"):

@@ -62,10 +62,11 @@ void OwnSurfaces::sendAll(bool mayHaveOthers) {
   for (const OwnSurface& surface : surfaces_) orders_.push_back({surface.id, What::mesh});
 }
 
-void OwnSurfaces::sendNothing() {
+void OwnSurfaces::sendNothing(bool mayHaveSome) {
   sends_ = false;
   orders_.clear();
   nextPart_ = 0;
+  if (mayHaveSome) orders_.push_back({0, What::others});
 }
 
 void OwnSurfaces::update(std::uint64_t nowUs) {
@@ -84,7 +85,7 @@ const std::string* OwnSurfaces::next() {
   --left_;
   const Order order = orders_.front();
   if (order.what == What::others) {
-    writeKeptSurfaces(message_, surfaces_);
+    writeKeptSurfaces(message_, sends_ ? surfaces_ : std::span<const OwnSurface>());
     finish();
     return &message_;
   }

@@ -31,15 +31,23 @@ class OwnSurfaces {
   // All are sent. `mayHaveOthers`: the participant was there before, and the server may have surfaces of it
   // that are no longer there. Else the server has none.
   void sendAll(bool mayHaveOthers);
-  // The server takes none: nothing is sent until sendAll().
-  void sendNothing();
+  // The server takes none, or the program does not allow that it has some: nothing is sent until sendAll().
+  // `mayHaveSome`: the server may have surfaces of this participant, and removes them.
+  void sendNothing(bool mayHaveSome);
+  // The program allows that they are sent, or no longer.
+  void allow() {
+    if (!sends_) sendAll(true);
+  }
+  void takeBack() {
+    if (sends_) sendNothing(true);
+  }
 
   void update(std::uint64_t nowUs);
   // Returns the next message, or nullptr. Valid until the next call of this function.
   const std::string* next();
 
  private:
-  // The last one removes what the server has and this object has not.
+  // The last one removes what the server has and should not have.
   enum class What : std::uint8_t { mesh, pose, removal, others };
   struct Order {
     std::uint32_t id;  // 0 with What::others

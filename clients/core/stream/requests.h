@@ -51,6 +51,8 @@ class Requests {
   bool isOfEndedUpload(std::uint64_t id) const { return id != 0 && id == endedUploadId_; }
 
   void update(std::uint64_t nowUs) { upload_.update(nowUs); }
+  // Id of the newest message, which the next one exceeds.
+  std::uint64_t& lastId() { return lastId_; }
   // Message of the upload, or nullptr.
   const std::string* nextOfUpload() { return upload_.next(lastId_); }
   void uploadPongReceived(std::uint64_t id) { upload_.pongReceived(id); }

@@ -368,6 +368,7 @@ struct SurfacePolicy {
   static constexpr std::uint32_t kUnspecified = 0;
   static constexpr std::uint32_t kOff = 1;
   static constexpr std::uint32_t kOwn = 2;
+  static constexpr std::uint32_t kEveryone = 3;
 };
 struct NoticeKind {
   static constexpr std::uint32_t kUnspecified = 0;
@@ -427,6 +428,7 @@ struct ClientMessage {
   static constexpr Field kLiftBan{63, WireType::kBytes};
   static constexpr Field kDatagramOffer{70, WireType::kBytes};
   static constexpr Field kSurface{80, WireType::kBytes};
+  static constexpr Field kGetSurfacePart{81, WireType::kBytes};
 };
 struct ServerMessage {
   static constexpr Field kRequestId{1, WireType::kVarint};
@@ -454,6 +456,8 @@ struct ServerMessage {
   static constexpr Field kListBans{62, WireType::kBytes};
   static constexpr Field kLiftBan{63, WireType::kBytes};
   static constexpr Field kDatagramAnswer{70, WireType::kBytes};
+  static constexpr Field kRoomSurfaces{80, WireType::kBytes};
+  static constexpr Field kGetSurfacePart{81, WireType::kBytes};
 };
 struct Hello {
   static constexpr Field kProtocolVersion{1, WireType::kVarint};
@@ -790,6 +794,28 @@ struct SurfacePart {
   static constexpr Field kTriangles{4, WireType::kBytes};
   static constexpr Field kTwoSided{5, WireType::kVarint};
   static constexpr Field kFriction{6, WireType::kFixed32};
+};
+struct RoomSurfaces {
+  static constexpr Field kSurfaces{1, WireType::kBytes};
+};
+struct RoomSurface {
+  static constexpr Field kParticipantId{1, WireType::kVarint};
+  static constexpr Field kId{2, WireType::kVarint};
+  static constexpr Field kRevision{3, WireType::kVarint};
+  static constexpr Field kPose{4, WireType::kBytes};
+  static constexpr Field kTwoSided{5, WireType::kVarint};
+  static constexpr Field kVertexCount{6, WireType::kVarint};
+  static constexpr Field kTriangleCount{7, WireType::kVarint};
+  static constexpr Field kPartCount{8, WireType::kVarint};
+};
+struct GetSurfacePartRequest {
+  static constexpr Field kParticipantId{1, WireType::kVarint};
+  static constexpr Field kId{2, WireType::kVarint};
+  static constexpr Field kRevision{3, WireType::kVarint};
+  static constexpr Field kIndex{4, WireType::kVarint};
+};
+struct GetSurfacePartResponse {
+  static constexpr Field kPart{1, WireType::kBytes};
 };
 struct Ping {
   static constexpr Field kClientTimeUs{1, WireType::kVarint};

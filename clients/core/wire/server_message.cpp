@@ -97,7 +97,8 @@ Body bodyOf(std::uint32_t tag) {
                               Body::deleteScene,    Body::controlScene,
                               Body::startRecording, Body::stopRecording,
                               Body::listBans,       Body::liftBan,
-                              Body::moving,         Body::datagramAnswer};
+                              Body::moving,         Body::datagramAnswer,
+                              Body::roomSurfaces,   Body::getSurfacePart};
   for (const Body body : kKnown) {
     if (tag == bytes(static_cast<std::uint32_t>(body))) return body;
   }

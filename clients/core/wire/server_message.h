@@ -42,6 +42,8 @@ enum class Body : std::uint32_t {
   listBans = field::ServerMessage::kListBans.number,
   liftBan = field::ServerMessage::kLiftBan.number,
   datagramAnswer = field::ServerMessage::kDatagramAnswer.number,
+  roomSurfaces = field::ServerMessage::kRoomSurfaces.number,
+  getSurfacePart = field::ServerMessage::kGetSurfacePart.number,
 };
 
 // An unknown kind of body is `none`.

@@ -83,7 +83,7 @@ void writeSurfaceRemoval(std::string& out, std::uint32_t id) {
                [](SurfaceWriter& update) { update.add_bool(field::SurfaceUpdate::kRemove.number, true); });
 }
 
-void writeKeptSurfaces(std::string& out, const std::vector<OwnSurface>& surfaces) {
+void writeKeptSurfaces(std::string& out, std::span<const OwnSurface> surfaces) {
   writeSurface(out, 0, [&](SurfaceWriter& update) {
     SurfaceWriter keep(update, field::SurfaceUpdate::kKeep.number);
     std::vector<std::uint32_t> ids;

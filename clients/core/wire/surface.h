@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,7 @@ void writeSurfacePart(std::string& out, const OwnSurface& surface, std::uint32_t
 void writeSurfacePose(std::string& out, const OwnSurface& surface);
 void writeSurfaceRemoval(std::string& out, std::uint32_t id);
 // The server removes all surfaces but these, of which the first kMaxKeptSurfaces count.
-void writeKeptSurfaces(std::string& out, const std::vector<OwnSurface>& surfaces);
+void writeKeptSurfaces(std::string& out, std::span<const OwnSurface> surfaces);
 inline constexpr std::size_t kMaxKeptSurfaces = 4096;
 
 }  // namespace clothstream::client

@@ -156,6 +156,102 @@ TEST_F(SurfacesTest, AreRefusedByAServerThatTakesNone) {
   EXPECT_THAT(error.text(), HasSubstr("--room-surfaces off"));
 }
 
+// The mesh of a surface in a list, part by part.
+model::Triangles meshOf(TestPeer& peer, const v1::RoomSurface& surface) {
+  model::Triangles mesh;
+  for (std::uint32_t index = 0; index < surface.part_count(); ++index) {
+    v1::ClientMessage request;
+    request.set_request_id(100 + index);
+    request.mutable_get_surface_part()->set_participant_id(surface.participant_id());
+    request.mutable_get_surface_part()->set_id(surface.id());
+    request.mutable_get_surface_part()->set_revision(surface.revision());
+    request.mutable_get_surface_part()->set_index(index);
+    peer.send(request);
+    const v1::ServerMessage answer = peer.readUntil(Body::kGetSurfacePart);
+    EXPECT_EQ(answer.request_id(), 100 + index);
+    const v1::SurfacePart& part = answer.get_surface_part().part();
+    EXPECT_EQ(part.index(), index);
+    EXPECT_EQ(part.count(), surface.part_count());
+    for (int i = 0; i + 2 < part.positions_size(); i += 3)
+      mesh.vertices.emplace_back(part.positions(i), part.positions(i + 1), part.positions(i + 2));
+    for (int i = 0; i + 2 < part.triangles_size(); i += 3)
+      mesh.triangles.push_back({part.triangles(i), part.triangles(i + 1), part.triangles(i + 2)});
+  }
+  return mesh;
+}
+
+TEST_F(SurfacesTest, AreSentToEveryoneIfThatIsThePolicy) {
+  hosting::ServerOptions options;
+  options.roomSurfaces = hosting::SurfacePolicy::everyone;
+  START_SURFACES(options);
+  TestPeer owner(server()), viewer(server());
+  viewer.role = v1::ROLE_VIEWER;
+  owner.join();
+  viewer.join();
+  EXPECT_EQ(owner.welcome().surfaces().policy(), v1::SURFACE_POLICY_EVERYONE);
+  // More triangles than one part has.
+  const model::Triangles mesh = model::flat(50, 50);
+  sendAll(owner, partsOf(3, mesh, 2000, -3));
+  const v1::RoomSurfaces list = viewer.readUntil(Body::kRoomSurfaces).room_surfaces();
+  ASSERT_EQ(list.surfaces_size(), 1);
+  const v1::RoomSurface& surface = list.surfaces(0);
+  EXPECT_EQ(surface.participant_id(), owner.welcome().participant_id());
+  EXPECT_EQ(surface.id(), 3u);
+  EXPECT_EQ(surface.pose().position().y(), -3);
+  EXPECT_EQ(surface.triangle_count(), 5000u);
+  EXPECT_EQ(surface.part_count(), 3u);
+  const model::Triangles seen = meshOf(viewer, surface);
+  EXPECT_EQ(seen.vertices.size(), surface.vertex_count());
+  EXPECT_EQ(seen.triangles.size(), 5000u);
+
+  // One that joins later has them at once. A new pose and a new mesh are announced.
+  TestPeer late(server());
+  late.join();
+  const std::uint64_t revision = surface.revision();
+  EXPECT_EQ(late.readUntil(Body::kRoomSurfaces).room_surfaces().surfaces(0).revision(), revision);
+  v1::ClientMessage move;
+  move.mutable_surface()->set_id(3);
+  move.mutable_surface()->mutable_pose()->mutable_position()->set_y(-4);
+  owner.send(move);
+  const v1::RoomSurfaces moved = viewer.readUntil(Body::kRoomSurfaces).room_surfaces();
+  EXPECT_EQ(moved.surfaces(0).pose().position().y(), -4);
+  EXPECT_EQ(moved.surfaces(0).revision(), revision);
+  sendAll(owner, partsOf(3, model::flat(1, 1), 10, -4));
+  const v1::RoomSurfaces replaced = viewer.readUntil(Body::kRoomSurfaces).room_surfaces();
+  EXPECT_NE(replaced.surfaces(0).revision(), revision);
+  EXPECT_EQ(replaced.surfaces(0).triangle_count(), 2u);
+
+  // The former mesh is gone, and a part that does not exist is refused.
+  v1::ClientMessage request;
+  v1::GetSurfacePartRequest& part = *request.mutable_get_surface_part();
+  part.set_participant_id(surface.participant_id());
+  part.set_id(3);
+  part.set_revision(revision);
+  EXPECT_EQ(refused(viewer, request).code(), v1::ERROR_CODE_NOT_FOUND);
+  part.set_revision(replaced.surfaces(0).revision());
+  part.set_index(2);
+  EXPECT_THAT(refused(viewer, request).text(), HasSubstr("getSurfacePart.index = 2: must be 0 to 1"));
+
+  owner.leave();
+  EXPECT_EQ(viewer.readUntil(Body::kRoomSurfaces).room_surfaces().surfaces_size(), 0);
+}
+
+TEST_F(SurfacesTest, AreNotSentOnRequestUnderAnotherPolicy) {
+  START_SURFACES();
+  TestPeer owner(server()), other(server());
+  owner.join();
+  other.join();
+  sendAll(owner, partsOf(3, model::flat(1, 1), 10, -3));
+  awaitSurfaces(owner, "small", 1);
+  v1::ClientMessage request;
+  request.mutable_get_surface_part()->set_participant_id(owner.welcome().participant_id());
+  request.mutable_get_surface_part()->set_id(3);
+  request.mutable_get_surface_part()->set_revision(1);
+  const v1::Error error = refused(other, request);
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_NOT_FOUND);
+  EXPECT_THAT(error.text(), HasSubstr("--room-surfaces everyone"));
+}
+
 TEST_F(SurfacesTest, NeedTheRoleParticipant) {
   START_SURFACES();
   TestPeer viewer(server());

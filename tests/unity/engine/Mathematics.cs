@@ -116,6 +116,8 @@ namespace UnityEngine
     public static class Mathf
     {
         public static int Min(int a, int b) { return Math.Min(a, b); }
+        public static float Max(float a, float b) { return Math.Max(a, b); }
+        public static float Abs(float value) { return Math.Abs(value); }
         public static float InverseLerp(float a, float b, float value) { return Math.Max(0, Math.Min(1, (value - a) / (b - a))); }
     }
 
@@ -133,6 +135,15 @@ namespace UnityEngine
         }
 
         public Quaternion rotation { get { return parent == null ? localRotation : parent.rotation * localRotation; } }
+
+        public Vector3 lossyScale
+        {
+            get
+            {
+                Vector3 of = parent == null ? new Vector3(1, 1, 1) : parent.lossyScale;
+                return new Vector3(of.x * localScale.x, of.y * localScale.y, of.z * localScale.z);
+            }
+        }
 
         public Matrix4x4 localToWorldMatrix
         {

@@ -36,6 +36,19 @@ namespace UnityEngine
         public Matrix4x4[] bindposes { get; set; } = new Matrix4x4[0];
         public bool isReadable { get; set; } = true;
 
+        public void GetVertices(List<Vector3> vertices)
+        {
+            vertices.Clear();
+            vertices.AddRange(this.vertices);
+        }
+
+        // All triangles are in the first submesh.
+        public void GetTriangles(List<int> triangles, int submesh)
+        {
+            triangles.Clear();
+            if (submesh == 0) triangles.AddRange(this.triangles);
+        }
+
         public int vertexCount { get; private set; }
         public Bounds bounds { get; private set; }
         public bool IsDynamic { get; private set; }

@@ -107,6 +107,19 @@ namespace UnityEngine
         public Transform transform { get { return gameObject.transform; } }
         public T GetComponent<T>() where T : class { return gameObject.GetComponent<T>(); }
 
+        // Of active objects, without those that are inactive.
+        public void GetComponentsInChildren<T>(List<T> results) where T : class
+        {
+            results.Clear();
+            foreach (GameObject one in Scene.Objects)
+            {
+                Transform at = one.transform;
+                while (at != null && at != transform) at = at.parent;
+                T found = at != null && one.activeInHierarchy ? one.GetComponent<T>() : null;
+                if (found != null) results.Add(found);
+            }
+        }
+
         public T GetComponentInParent<T>() where T : class
         {
             for (Transform at = transform; at != null; at = at.parent)

@@ -140,6 +140,66 @@ static unsafe class SceneProgram
         Await(() => client.TakeGrabEvents().Any(grab => grab.kind == (uint)GrabEventKind.Taken), "a trigger grabs");
     }
 
+    static GameObject Square(string name, Transform parent, float height)
+    {
+        var square = new GameObject(name, typeof(MeshFilter));
+        square.transform.SetParent(parent, false);
+        square.transform.localPosition = new Vector3(0, height, 0);
+        // Its front is above: clockwise in Unity's left-handed system.
+        square.GetComponent<MeshFilter>().sharedMesh = new Mesh
+        {
+            subMeshCount = 1,
+            vertices = new[] { new Vector3(-2, 0, -2), new Vector3(-2, 0, 2), new Vector3(2, 0, 2), new Vector3(2, 0, -2) },
+            triangles = new[] { 0, 1, 2, 0, 2, 3 }
+        };
+        return square;
+    }
+
+    static float Lowest(Client client)
+    {
+        float lowest = float.MaxValue;
+        lock (client.Gate)
+            for (int i = 0; i < client.VertexCount; ++i) lowest = Math.Min(lowest, client.Positions[3 * i + 1]);
+        return lowest;
+    }
+
+    // A table of the real room that is 2 cm higher than the lower edges of the hanging cloth lifts them, since cloth that is
+    // up to 3 cm behind a surface is pushed to its front. Cloth keeps at least 0.5 mm from it.
+    static void LiesOnTheRoom(ClothStreamConnection connection)
+    {
+        Client client = connection.Client;
+        float hangs = Lowest(client);
+        var room = new GameObject("room").AddComponent<ClothStreamRoom>();
+        Check(!room.enabled && Debug.Lines.Last().StartsWith("error ClothStream: ClothStream Room has no connection"), "a room without connection is an error");
+        Debug.Lines.Clear();
+        room.connection = connection;
+        room.meshes = new GameObject("trackables").transform;
+        room.meshes.SetParent(connection.transform, false);
+        float height = hangs + 0.02f;
+        GameObject table = Square("table", room.meshes, height), empty = Square("empty", room.meshes, 0);
+        empty.GetComponent<MeshFilter>().sharedMesh = null;
+        room.enabled = true;
+        for (int i = 0; i < 200; ++i)
+        {
+            Scene.Frame();
+            Thread.Sleep(5);
+        }
+        Check(room.Count == 0 && Lowest(client) < height, "nothing is sent before the user agrees");
+        room.share = RoomSharing.Server;
+        Await(() => Lowest(client) > height, "the cloth lies on the table");
+        table.SetActive(false);
+        Await(() => Lowest(client) < height - 0.01f, "a table that is gone lets the cloth down");
+        table.SetActive(true);
+        Await(() => Lowest(client) > height, "and holds it again");
+        table.transform.localPosition = new Vector3(0, height - 1, 0);
+        Await(() => Lowest(client) < height - 0.01f, "a table that is moved lets the cloth down");
+        table.transform.localPosition = new Vector3(0, height, 0);
+        Await(() => Lowest(client) > height, "and holds it when it is back");
+        room.share = RoomSharing.NoOne;
+        Await(() => room.Count == 0 && Lowest(client) < height - 0.01f, "all is taken back");
+        UnityEngine.Object.Destroy(room.gameObject);
+    }
+
     static void Pairs(string address, string code)
     {
         var stream = new GameObject("stream");
@@ -189,6 +249,7 @@ static unsafe class SceneProgram
 
         DrawsCloth(connection, cloth, cloth.materials);
         SendsHandsAndGrabs(connection, cloth);
+        LiesOnTheRoom(connection);
         Check(Debug.Lines.Count == 0, "nothing is logged");
 
         Client client = connection.Client;

@@ -29,6 +29,7 @@ CS_OWN_WIND_VERSION = 1
 CS_MAX_SURFACE_VERTICES = 150000
 CS_MAX_SURFACE_TRIANGLES = 50000
 CS_SURFACE_VERSION = 1
+CS_ROOM_SURFACE_VERSION = 1
 CS_GRAB_EVENT_VERSION = 1
 CS_CONTACT_EVENT_VERSION = 1
 CS_TRACKED_BODY_VERSION = 1
@@ -68,6 +69,7 @@ CS_EVENT_PAIRING_CODE = 16384
 CS_EVENT_ANSWER = 32768
 CS_EVENT_MOVING = 65536
 CS_EVENT_DATAGRAMS = 131072
+CS_EVENT_SURFACES = 262144
 CS_ERROR_UNAUTHENTICATED = 60
 CS_ERROR_WRONG_PAIRING_CODE = 61
 CS_ROLE_UNSPECIFIED = 0
@@ -100,6 +102,7 @@ CS_WIND_VORTEX = 1
 CS_SURFACES_UNKNOWN = 0
 CS_SURFACES_OFF = 1
 CS_SURFACES_OWN = 2
+CS_SURFACES_EVERYONE = 3
 CS_HAND_LEFT = 1
 CS_HAND_RIGHT = 2
 CS_GRAB_TAKEN = 1
@@ -383,6 +386,23 @@ class cs_surface(c.Structure):
         ("triangle_count", c.c_uint32),
         ("two_sided", c.c_uint32),
         ("friction", c.c_float),
+    ]
+
+
+class cs_room_surface(c.Structure):
+    VERSION = CS_ROOM_SURFACE_VERSION
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("id", c.c_uint32),
+        ("participant_id", c.c_uint64),
+        ("revision", c.c_uint64),
+        ("position", c.c_float * 3),
+        ("orientation", c.c_float * 4),
+        ("positions", c.POINTER(c.c_float)),
+        ("vertex_count", c.c_uint32),
+        ("triangles", c.POINTER(c.c_uint32)),
+        ("triangle_count", c.c_uint32),
+        ("two_sided", c.c_uint32),
     ]
 
 
@@ -855,9 +875,13 @@ FUNCTIONS = {
     "cs_body_joints": (c.POINTER(c.c_float), [c.c_void_p, c.POINTER(c.c_uint32)]),
     "cs_body_below_neck": (c.POINTER(c.c_uint32), [c.c_void_p, c.c_uint32, c.POINTER(c.c_uint32)]),
     "cs_get_surface_policy": (c.c_int, [c.c_void_p]),
+    "cs_allow_surfaces": (None, [c.c_void_p, c.c_uint32]),
     "cs_set_surface": (c.c_int, [c.c_void_p, c.POINTER(cs_surface)]),
     "cs_move_surface": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(c.c_float), c.POINTER(c.c_float)]),
     "cs_remove_surface": (c.c_int, [c.c_void_p, c.c_uint32]),
+    "cs_follow_surfaces": (None, [c.c_void_p, c.c_int]),
+    "cs_room_surface_count": (c.c_uint32, [c.c_void_p]),
+    "cs_get_room_surface": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_room_surface)]),
     "cs_grab_event_count": (c.c_uint32, [c.c_void_p]),
     "cs_get_grab_event": (c.c_int, [c.c_void_p, c.c_uint32, c.POINTER(cs_grab_event)]),
     "cs_want_contacts": (None, [c.c_void_p, c.c_int, c.c_uint64]),

@@ -272,6 +272,11 @@ class Stream(ClientState):
         with self._client() as client:
             return SurfacePolicy(lib.cs_get_surface_policy(client))
 
+    def allow_surfaces(self, policy: SurfacePolicy) -> None:
+        """Says how far the server's policy may go for surfaces to be sent: OWN (default) or EVERYONE. Ask the person first."""
+        with self._client() as client:
+            lib.cs_allow_surfaces(client, policy)
+
     def set_surface(self, surface: Surface) -> None:
         """Adds a surface of the real room, or replaces the one with its id. Event.ERROR reports a refusal by the server."""
         positions = [float(number) for vertex in surface.positions for number in vector(vertex, 3)]
@@ -290,9 +295,13 @@ class Stream(ClientState):
             if lib.cs_set_surface(client, c.byref(struct)):
                 return
             policy = SurfacePolicy(lib.cs_get_surface_policy(client))
-        if policy is SurfacePolicy.OWN:
-            raise ValueError(f"{len(surface.triangles)} triangles and {len(positions) // 3} vertices; a surface has 1 to "
+        triangle_count, vertex_count = len(surface.triangles), len(positions) // 3
+        fits = 0 < triangle_count <= b.CS_MAX_SURFACE_TRIANGLES and vertex_count <= b.CS_MAX_SURFACE_VERTICES
+        if policy in (SurfacePolicy.OWN, SurfacePolicy.EVERYONE) and not fits:
+            raise ValueError(f"{triangle_count} triangles and {vertex_count} vertices; a surface has 1 to "
                              f"{b.CS_MAX_SURFACE_TRIANGLES} and at most {b.CS_MAX_SURFACE_VERTICES}")
+        if policy is SurfacePolicy.EVERYONE:
+            raise RuntimeError("this server sends surfaces to everyone in the scene; call allow_surfaces() first")
         raise RuntimeError(f"this server takes no surfaces of the real room ({policy.name.lower()})")
 
     def move_surface(self, id: int, position: Vec3, orientation: Quaternion | None = None) -> None:

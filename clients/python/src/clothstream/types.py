@@ -65,6 +65,7 @@ class SurfacePolicy(enum.IntEnum):
     UNKNOWN = b.CS_SURFACES_UNKNOWN  # not connected yet, or the server is of a release that knows none
     OFF = b.CS_SURFACES_OFF  # it refuses them
     OWN = b.CS_SURFACES_OWN  # they act on the cloth, and their shape is sent to no client
+    EVERYONE = b.CS_SURFACES_EVERYONE  # they act on the cloth, and everyone in the scene gets their shape
 
 
 class Solver(enum.IntEnum):

@@ -30,6 +30,7 @@ namespace ClothStream.Core
         Answer = 32768,
         Moving = 65536,
         Datagrams = 131072,
+        Surfaces = 262144,
     }
 
     /// <summary>
@@ -117,6 +118,7 @@ namespace ClothStream.Core
         Unknown = 0,
         Off = 1,
         Own = 2,
+        Everyone = 3,
     }
 
     /// <summary>
@@ -708,6 +710,43 @@ namespace ClothStream.Core
         /// coefficient of friction, 0 to 10, multiplied with the cloth's
         /// </summary>
         [FieldOffset(72)] public float friction;
+    }
+
+    /// <summary>
+    /// Surface of the real room of another participant. The arrays are valid until the next CS_EVENT_SURFACES.
+    /// </summary>
+    [StructLayout(LayoutKind.Explicit, Size = 88)]
+    public unsafe struct RoomSurface
+    {
+        [FieldOffset(0)] public uint version;
+        /// <summary>
+        /// unique for its participant
+        /// </summary>
+        [FieldOffset(4)] public uint id;
+        [FieldOffset(8)] public ulong participantId;
+        /// <summary>
+        /// differs from that of every other mesh of the scene
+        /// </summary>
+        [FieldOffset(16)] public ulong revision;
+        [FieldOffset(24)] public fixed float position[3];
+        /// <summary>
+        /// quaternion x y z w
+        /// </summary>
+        [FieldOffset(36)] public fixed float orientation[4];
+        /// <summary>
+        /// x, y, z of each vertex, in the frame of the surface
+        /// </summary>
+        [FieldOffset(56)] public float* positions;
+        [FieldOffset(64)] public uint vertexCount;
+        /// <summary>
+        /// three vertices of each triangle, counter-clockwise seen from the front
+        /// </summary>
+        [FieldOffset(72)] public uint* triangles;
+        [FieldOffset(80)] public uint triangleCount;
+        /// <summary>
+        /// 1: cloth can be on both sides
+        /// </summary>
+        [FieldOffset(84)] public uint twoSided;
     }
 
     [StructLayout(LayoutKind.Explicit, Size = 40)]
@@ -1353,6 +1392,7 @@ namespace ClothStream.Core
         public const uint CS_MAX_SURFACE_VERTICES = 150000;
         public const uint CS_MAX_SURFACE_TRIANGLES = 50000;
         public const uint CS_SURFACE_VERSION = 1;
+        public const uint CS_ROOM_SURFACE_VERSION = 1;
         public const uint CS_GRAB_EVENT_VERSION = 1;
         public const uint CS_CONTACT_EVENT_VERSION = 1;
         public const uint CS_TRACKED_BODY_VERSION = 1;
@@ -1808,10 +1848,17 @@ namespace ClothStream.Core
         /// </summary>
         [DllImport(Library)] public static extern SurfacePolicy cs_get_surface_policy(IntPtr client);
         /// <summary>
+        /// Says how far the policy of the server may go for surfaces to be sent: CS_SURFACES_OWN (default), or
+        /// CS_SURFACES_EVERYONE. The shape of a home is private: ask the user first. If it may go less far than
+        /// before, the server is asked to remove the surfaces that it has; if it may go further, they are sent.
+        /// </summary>
+        [DllImport(Library)] public static extern void cs_allow_surfaces(IntPtr client, uint policy);
+        /// <summary>
         /// Adds a surface of the real room, or replaces the one with its id. The mesh is copied, and sent again after
         /// a reconnect. It acts when it has arrived completely; until then the former one does. Fails, and changes
         /// nothing, if the version is unknown, if a count is not allowed, or if the client is in a scene whose server
-        /// takes no surfaces. If the client joins such a scene later, CS_EVENT_ERROR says so.
+        /// takes no surfaces, or whose policy goes further than cs_allow_surfaces says. If the client joins such a
+        /// scene later, CS_EVENT_ERROR says so.
         /// </summary>
         [DllImport(Library)] public static extern int cs_set_surface(IntPtr client, Surface* surface);
         /// <summary>
@@ -1823,6 +1870,18 @@ namespace ClothStream.Core
         /// Removes a surface. Fails if there is no surface with this id.
         /// </summary>
         [DllImport(Library)] public static extern int cs_remove_surface(IntPtr client, uint id);
+        /// <summary>
+        /// Gets the surfaces of others, if the policy of the server is CS_SURFACES_EVERYONE. Default: off.
+        /// </summary>
+        [DllImport(Library)] public static extern void cs_follow_surfaces(IntPtr client, int on);
+        /// <summary>
+        /// Number of surfaces of others whose meshes have arrived.
+        /// </summary>
+        [DllImport(Library)] public static extern uint cs_room_surface_count(IntPtr client);
+        /// <summary>
+        /// Fails if the index is out of range or the version is unknown.
+        /// </summary>
+        [DllImport(Library)] public static extern int cs_get_room_surface(IntPtr client, uint index, RoomSurface* @out);
         /// <summary>
         /// Number of events in the newest CS_EVENT_GRABS, for the grabs of all participants.
         /// </summary>

@@ -100,9 +100,13 @@ export interface CoreFunctions {
   cs_body_joints(client: Pointer, count: Pointer): Pointer;
   cs_body_below_neck(client: Pointer, collider: number, indexCount: Pointer): Pointer;
   cs_get_surface_policy(client: Pointer): number;
+  cs_allow_surfaces(client: Pointer, policy: number): void;
   cs_set_surface(client: Pointer, surface: Pointer): number;
   cs_move_surface(client: Pointer, id: number, position3: Pointer, orientation4: Pointer): number;
   cs_remove_surface(client: Pointer, id: number): number;
+  cs_follow_surfaces(client: Pointer, on: number): void;
+  cs_room_surface_count(client: Pointer): number;
+  cs_get_room_surface(client: Pointer, index: number, out: Pointer): number;
   cs_grab_event_count(client: Pointer): number;
   cs_get_grab_event(client: Pointer, index: number, out: Pointer): number;
   cs_want_contacts(client: Pointer, wants: number, nowUs: bigint): void;

@@ -5,6 +5,7 @@ export { Client } from "./client";
 export * from "./session";
 export { Frames } from "./frames";
 export { Input } from "./input";
+export { kMostSurfaceTriangles, SurfacePolicy, Surfaces, type RoomSurface, type Surface } from "./surfaces";
 export type { Proof } from "./thread_messages";
 export * from "./types";
 export { BodyPart, Wearing, type BodyPose, type TrackedBody } from "./wearing";

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Colliders, hands and grabs of this participant, and joints of the scene's colliders.
+// Colliders, hands, grabs and surfaces of this participant, and joints of the scene's colliders.
 
 import { CS_GRAB_EVENT_VERSION, CS_GRAB_VERSION, CS_OWN_COLLIDER_VERSION, CS_OWN_WIND_VERSION, cs_cloth_point, cs_grab, cs_grab_event, cs_own_collider, cs_own_wind } from "./layout";
 import { nowUs, writeFloats, type CoreHandle } from "./handle";
+import { Surfaces } from "./surfaces";
 import { HandSide, kMaxColliders, kMaxGrabs, kMaxWinds, type Grab, type GrabEvent, type Head, type OwnCollider, type OwnWind } from "./types";
 
 const kJointFloats = 4; // x, y, z, radius
@@ -22,10 +23,13 @@ export function readGrabEvents(handle: CoreHandle): (GrabEvent & { participant: 
 }
 
 export class Input {
+  // Surfaces of the real room.
+  readonly surfaces: Surfaces;
   // Arrays of structs for a call: as large as the largest of them. Places of grabs follow the grabs.
   private readonly array: number;
 
   constructor(private readonly handle: CoreHandle) {
+    this.surfaces = new Surfaces(handle);
     this.array = handle.core.allocate(
       Math.max(kMaxColliders * cs_own_collider.sizeof, kMaxGrabs * (cs_grab.sizeof + cs_cloth_point.sizeof), kHandJoints * kJointFloats * 4),
     );

@@ -19,6 +19,7 @@ export const CS_CLOTH_POINT_VERSION = 1;
 export const CS_GRAB_VERSION = 1;
 export const CS_OWN_WIND_VERSION = 1;
 export const CS_SURFACE_VERSION = 1;
+export const CS_ROOM_SURFACE_VERSION = 1;
 export const CS_GRAB_EVENT_VERSION = 1;
 export const CS_CONTACT_EVENT_VERSION = 1;
 export const CS_TRACKED_BODY_VERSION = 1;
@@ -206,6 +207,20 @@ export const cs_surface = {
   triangle_count: 48,
   two_sided: 52,
   friction: 56,
+} as const;
+export const cs_room_surface = {
+  sizeof: 72,
+  version: 0,
+  id: 4,
+  participant_id: 8,
+  revision: 16,
+  position: 24,
+  orientation: 36,
+  positions: 52,
+  vertex_count: 56,
+  triangles: 60,
+  triangle_count: 64,
+  two_sided: 68,
 } as const;
 export const cs_grab_event = {
   sizeof: 40,

@@ -38,6 +38,8 @@ export interface SessionListener {
   // A request of client.requests succeeded or failed.
   answered?(client: Client): void;
   grabsChanged?(client: Client): void;
+  // Surfaces of the real rooms of others.
+  surfacesChanged?(client: Client): void;
   notice?(text: string): void;
   pairingCodeMade?(client: Client): void;
   // The server refused a request; the session continues.
@@ -54,6 +56,7 @@ export interface SessionOptions {
   places?: TokenStore;
   quality?: number; // best quality wanted, 0 (finest, the default) to 3
   transport?: Transport; // default: "auto"
+  surfaces?: boolean; // gets surfaces of the real rooms of others. Default: false
   // Addresses of the package's own files, where a bundler does not find them.
   wasmUrl?: string | URL;
   makeWorker?: () => Worker;
@@ -138,6 +141,8 @@ export class Session {
 
   // Sends what the program has set since the last call. Call after changes; once per drawn frame is enough.
   flush(): void {
+    // Meshes of surfaces are sent a few parts at a time.
+    this.client.update();
     for (let message = this.client.nextOutgoing(); message; message = this.client.nextOutgoing())
       this.post({ kind: "send", connection: this.connection, message }, [message.buffer]);
   }
@@ -192,6 +197,7 @@ export class Session {
     // Secrets go to other machines only with TLS.
     const follows = url.startsWith("wss:") || ("token" in proof && proof.token === "");
     client.followRedirects(follows);
+    client.input.surfaces.follow(this.options.surfaces === true);
     client.frames.playOut();
     client.frames.keepClothInFrontOfHands(true);
     this.post({
@@ -294,6 +300,7 @@ export class Session {
     if (events & ClientEvent.scenes) listener.scenesListed?.(client);
     if (events & ClientEvent.answer) listener.answered?.(client);
     if (events & ClientEvent.grabs) listener.grabsChanged?.(client);
+    if (events & ClientEvent.surfaces) listener.surfacesChanged?.(client);
     if (events & ClientEvent.token) this.tokens.keep(client.token);
     if (events & ClientEvent.pairingCode) listener.pairingCodeMade?.(client);
     if (events & ClientEvent.notice) listener.notice?.(client.noticeText);

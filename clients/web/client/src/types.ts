@@ -28,6 +28,7 @@ export const ClientEvent = {
   answer: 32768,
   moving: 65536,
   datagrams: 131072,
+  surfaces: 262144,
 } as const;
 
 // Values of Client.errorCode and of SessionState: ErrorCode of session.proto. A newer server may have more.

@@ -10,6 +10,7 @@ import type { Failures } from "./failures";
 import { HeadsetPanel } from "./headset_panel";
 import { element, make, write } from "./panel/dom";
 import type { Panel } from "./panel/panel";
+import { RoomSharing } from "./room_sharing";
 import type { View } from "./view";
 import { makeHeadset } from "./view_headset";
 
@@ -35,6 +36,7 @@ export class HeadsetPage {
   readonly headset: Headset;
   readonly panel = new CanvasPanel();
   private readonly content: HeadsetPanel;
+  private readonly room: RoomSharing;
   private isBefore = false; // the panel is before the eyes
   private why: Failure | undefined; // there is no headset
   private worn = ""; // name of the own body, as it is drawn
@@ -51,6 +53,7 @@ export class HeadsetPage {
         this.isBefore = false;
         this.wear("");
         this.showBody("");
+        this.room.end();
         view.resize();
         view.reset();
       },
@@ -58,7 +61,8 @@ export class HeadsetPage {
       updated: () => this.panel.update(this.headset.body, this.headset.placement.matrix),
       doingChanged: () => this.show(),
     });
-    this.content = new HeadsetPanel(session, panel, {
+    this.room = new RoomSharing(session, () => this.headset.realRoom, (text) => this.say(text), () => this.show());
+    this.content = new HeadsetPanel(session, panel, this.room, {
       sceneChosen: (scene) => listener.sceneChosen(scene),
       doingChosen: (doing) => this.headset.do(doing),
       left: () => void this.headset.leave(),
@@ -79,6 +83,11 @@ export class HeadsetPage {
     this.headset.slipped(grab);
   }
 
+  // Whether a refusal of the server is about the real room, and nothing that the user has to know.
+  refused({ errorText, errorCode }: Client): boolean {
+    return this.room.refused(errorText, errorCode);
+  }
+
   // Call first in each frame of a session.
   draw(frame: XRFrame, now: number, client: Client | undefined): void {
     this.headset.update(frame, now, client);
@@ -89,6 +98,7 @@ export class HeadsetPage {
   // Updates the panel.
   show(): void {
     if (!this.headset.session) return;
+    this.room.watch();
     const { current } = this.failures;
     if (current && !current.quiet) return this.showFailure(current);
     this.isBefore = false;
@@ -164,7 +174,10 @@ export class HeadsetPage {
 
   private async enter(mode: Mode): Promise<void> {
     try {
-      await this.headset.enter(mode, this.session.client.frames.streamRate);
+      const answer = mode === "immersive-ar" ? await this.room.ask() : "keep";
+      if (!answer) return;
+      await this.headset.enter(mode, this.session.client.frames.streamRate, answer === "send");
+      this.room.begin(answer);
       this.show();
     } catch (error) {
       this.listener.notice(`The headset did not start: ${error instanceof Error ? error.message : String(error)}`);

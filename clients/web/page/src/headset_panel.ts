@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Content of the panel in space: scenes, people, quality and figures, each under its tab, and where the scene stands.
+// Content of the panel in space: scenes, people, quality, figures and the real room, each under its tab, and where the scene
+// stands.
 
 import { Roles, type Session } from "@clothstream/client";
 import type { Doing, Mode, PanelButton, PanelRow } from "@clothstream/three";
 import { drawHud, kHudHeight, kHudWidth, type HudTheme } from "./panel/hud_drawing";
 import type { Panel } from "./panel/panel";
+import type { RoomSharing } from "./room_sharing";
 
-const kTabs = ["Scenes", "People", "Quality", "Figures"] as const;
+const kTabs = ["Scenes", "People", "Quality", "Figures", "Room"] as const;
 const kOnePage = 7; // rows of a list
 const kFiguresRows = 6.7;
 const kMessageMs = 6000;
@@ -42,6 +44,7 @@ export class HeadsetPanel {
   constructor(
     private readonly session: Session,
     private readonly panel: Panel,
+    private readonly room: RoomSharing,
     private readonly listener: HeadsetPanelListener,
   ) {}
 
@@ -55,8 +58,11 @@ export class HeadsetPanel {
   rows(mode: Mode | undefined, doing: Doing, holdsFan: boolean, words: string | undefined): PanelRow[] {
     const { listener } = this;
     const place = mode === "immersive-ar" ? "Place on a surface" : "Place before me";
+    const room = this.room.rows();
+    if (!room && this.tab === "Room") this.tab = "Scenes";
+    const tabs = room ? kTabs : kTabs.slice(0, -1);
     return [
-      { buttons: kTabs.map((tab) => ({ text: tab, isChosen: tab === this.tab, action: () => this.open(tab) })) },
+      { buttons: tabs.map((tab) => ({ text: tab, isChosen: tab === this.tab, action: () => this.open(tab) })) },
       ...this.content(holdsFan),
       {
         buttons: [
@@ -86,6 +92,8 @@ export class HeadsetPanel {
         ];
       case "Figures":
         return [this.figures()];
+      case "Room":
+        return this.room.rows() ?? [];
     }
   }
 

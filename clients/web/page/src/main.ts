@@ -76,6 +76,7 @@ async function start(): Promise<void> {
     },
     scenesListed: (client) => panel.scenesListed(client),
     answered: (client) => panel.answered(client),
+    surfacesChanged: (client) => view.showRooms(client),
     grabsChanged: (client) => {
       for (const { grab, vertices } of client.input.grabEvents()) {
         if (vertices > 0) continue;
@@ -88,6 +89,7 @@ async function start(): Promise<void> {
       panel.noticed();
     },
     refused: (client) => {
+      if (headset.refused(client)) return;
       notify(client.errorText);
       if (client.errorText.startsWith("colliderPoses.winds")) putFanAway();
       panel.refused(client);
@@ -101,6 +103,7 @@ async function start(): Promise<void> {
     tokens: browserTokens,
     places: tabPlaces,
     quality: qualityOfAddress(),
+    surfaces: true,
     transport: transportOfAddress((text) => hud.showNotice(text)),
     listener,
   };

@@ -30,6 +30,8 @@ export interface Probe {
   readonly colliders: Collider[];
   // Names of other participants that are drawn, and the places of their labels.
   readonly people: View["shownPeople"];
+  // Surfaces of the real rooms of others that are drawn.
+  readonly roomSurfaces: number;
   // Drawn positions of the scene's colliders.
   readonly drawnColliders: Vec3[];
   // Drawn vertices of the scene's colliders, in their frames.
@@ -65,8 +67,12 @@ export interface HeadsetProbe {
   readonly isAnchored: boolean;
   readonly placement: number[]; // matrix from scene to room, column by column
   readonly shadowReach: number; // half the width of the shadow map in the room, m
-  // Chooses what the next presses do, like the panel in space. The one function of the probe that changes something.
+  // Surfaces of the real room: those that are drawn, and those that the server has.
+  readonly room: { detects: boolean; shares: boolean; detected: number; sent: number };
+  // Chooses what the next presses do, like the panel in space. The functions choose and press are those of the probe that change something.
   choose(doing: Doing): void;
+  // Presses a button of the panel in space by its text.
+  press(text: string): void;
   // The panel in space: its middle in the room, its picture, lines of text, and buttons with the places of their middles.
   readonly panel: {
     readonly place: Vec3;
@@ -139,6 +145,9 @@ export function expose(session: Session, view: View, { headset, panel, work, his
     get people() {
       return view.shownPeople;
     },
+    get roomSurfaces() {
+      return view.roomSurfaces;
+    },
     get drawnColliders() {
       return view.colliders.map(({ position }) => position.toArray());
     },
@@ -175,12 +184,14 @@ export function expose(session: Session, view: View, { headset, panel, work, his
         isAnchored: headset.isAnchored,
         placement: headset.placement.matrix.toArray(),
         shadowReach: view.shadowReach,
+        room: { detects: headset.realRoom.detects, shares: headset.realRoom.shares, ...headset.realRoom.counts },
         choose: (doing: Doing) => headset.do(doing),
         worn: {
           name: session.client.wearing.own,
           mirror: view.hasMirror,
           part: (part: BodyPart) => session.client.wearing.part(part),
         },
+        press: (text: string) => panel.pressText(text),
         panel: {
           place: panel.mesh.getWorldPosition(new THREE.Vector3()).toArray(),
           canvas: panel.canvas,

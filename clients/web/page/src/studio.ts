@@ -92,10 +92,11 @@ export class Studio {
     });
   }
 
-  // Hides room, background and fog, so that the real room is seen. Shadows still fall on its floor.
-  passThrough(on: boolean): void {
+  // Hides room, background and fog, so that the real room is seen. Shadows still fall on the floor of the scene, unless the
+  // real room has a floor that takes them.
+  passThrough(on: boolean, hasFloor = false): void {
     this.room.group.visible = !on;
-    this.catcher.visible = on;
+    this.catcher.visible = on && !hasFloor;
     this.scene.background = on ? null : this.background;
     this.scene.fog = on ? null : this.fog;
   }

@@ -4,7 +4,9 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Shape, type Client, type Vec3 } from "@clothstream/client";
-import { Cloths, ColliderMeshes, ConstraintLines, type Detail, Mirror, People, reachOf, type ColliderMesh } from "@clothstream/three";
+import {
+  Cloths, ColliderMeshes, ConstraintLines, type Detail, Mirror, People, reachOf, RoomOutlines, type ColliderMesh,
+} from "@clothstream/three";
 import { Fingers } from "./fingers";
 import { useSoftShadows } from "./soft_shadow";
 import { Studio } from "./studio";
@@ -27,6 +29,7 @@ export class View {
   private readonly studio: Studio;
   private readonly colliderMeshes = new ColliderMeshes();
   private readonly people = new People();
+  private readonly rooms = new RoomOutlines();
   private readonly constraints = new ConstraintLines();
   private readonly mirror = new Mirror((on) => this.colliderMeshes.drawForMirror(on));
   drawsConstraints = false; // those that the newest report names
@@ -59,7 +62,8 @@ export class View {
     this.renderer.toneMapping = THREE.AgXToneMapping;
     this.renderer.toneMappingExposure = 1.35;
     this.studio = new Studio(this.renderer, detail, (reflections) => this.colliderMeshes.reflect(reflections));
-    this.studio.scene.add(this.cloths.group, this.colliderMeshes.group, this.people.group, this.constraints.lines, this.mirror.group);
+    this.studio.scene.add(this.cloths.group, this.colliderMeshes.group, this.people.group, this.rooms.group);
+    this.studio.scene.add(this.constraints.lines, this.mirror.group);
     this.orbit = new OrbitControls(this.camera, canvas);
     const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
     const damp = () => (this.orbit.enableDamping = !calm.matches);
@@ -81,9 +85,9 @@ export class View {
     return this.bounds;
   }
 
-  // Hides the drawn room, so that the real one is seen.
-  passThrough(on: boolean): void {
-    this.studio.passThrough(on);
+  // Hides the drawn room, so that the real one is seen. hasFloor: others draw shadows on its floor.
+  passThrough(on: boolean, hasFloor: boolean): void {
+    this.studio.passThrough(on, hasFloor);
   }
 
   get colliders(): readonly ColliderMesh[] {
@@ -108,6 +112,7 @@ export class View {
   describe(client: Client): void {
     this.cloths.describe(client);
     this.constraints.describe(client);
+    this.rooms.show(client);
     this.bounds.copy(this.cloths.reach());
     this.colliderMeshes.describe();
     for (const collider of client.frames.colliders()) {
@@ -140,6 +145,15 @@ export class View {
 
   get hasMirror(): boolean {
     return this.mirror.isShown;
+  }
+
+  // Shows the surfaces of the real rooms of others. Call when they change.
+  showRooms(client: Client): void {
+    this.rooms.show(client);
+  }
+  // Surfaces of the real rooms of others that are drawn.
+  get roomSurfaces(): number {
+    return this.rooms.count;
   }
 
   // Whether a collider of this participant yielded in the last drawn frame.

@@ -14,7 +14,7 @@ export function makeHeadset(view: View, session: Session, listener: HeadsetListe
       change(session.client.input);
       session.flush();
     },
-    passThrough: (on) => view.passThrough(on),
+    passThrough: (on, hasFloor) => view.passThrough(on, hasFloor),
   };
   return new Headset(host, listener);
 }

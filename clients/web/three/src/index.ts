@@ -10,6 +10,7 @@ export { FanFigure, heldFan } from "./fan";
 export { fabricNames, fabricOf, type Fabric } from "./fabrics";
 export { Mirror } from "./mirror";
 export * from "./people";
+export { RoomOutlines } from "./room_outlines";
 export { hash, noise } from "./weave";
 export { Body } from "./xr/body";
 export { CanvasPanel } from "./xr/canvas_panel";
@@ -19,5 +20,8 @@ export { Grabber, newGrabId, type GrabPose, type Touchable } from "./xr/grabber"
 export { chooseRate, Immersion, type ImmersionListener, type Mode } from "./xr/immersion";
 export { Headset, type Doing, type HeadsetHost, type HeadsetListener } from "./xr/headset";
 export { Limb } from "./xr/limb";
+export { DetectedSurfaces, type DetectedSurface } from "./xr/detected_surfaces";
+export { RealRoom } from "./xr/real_room";
+export * from "./xr/room_mesh";
 export { Wearer } from "./xr/wearer";
 export { Placement, TwoHandMove } from "./xr/placement";

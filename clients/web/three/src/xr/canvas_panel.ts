@@ -91,6 +91,11 @@ export class CanvasPanel {
     return button !== kMisses;
   }
 
+  // Presses the button with this text.
+  pressText(text: string): void {
+    this.layout.areas.find(({ button }) => button.text === text)?.button.action?.();
+  }
+
   dispose(): void {
     this.texture.dispose();
     this.mesh.geometry.dispose();

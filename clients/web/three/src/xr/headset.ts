@@ -11,6 +11,7 @@ import { Immersion, type Mode } from "./immersion";
 import type { Limb } from "./limb";
 import { Placement, TwoHandMove } from "./placement";
 import { Wearer } from "./wearer";
+import { RealRoom } from "./real_room";
 
 // Distance from the user to the front of the scene when it is placed, m.
 const kArmLength = 0.5;
@@ -24,8 +25,9 @@ export interface HeadsetHost {
   bounds(): THREE.Box3;
   // Changes the input of the present client and sends it, also while no frames come.
   change(change: (input: Input) => void): void;
-  // The real room is seen instead of the drawn one.
-  passThrough(on: boolean): void;
+  // The real room is seen instead of the drawn one. hasFloor: its surfaces take the cloth's shadow, so that the floor of
+  // the scene need not.
+  passThrough(on: boolean, hasFloor: boolean): void;
 }
 
 export interface HeadsetListener {
@@ -50,12 +52,17 @@ export class Headset {
   readonly room = new THREE.Group();
   // Objects that stand where the user stood when the scene was placed, and look the same way.
   readonly seat = new THREE.Group();
+  readonly realRoom = new RealRoom();
   doing: Doing = "touch";
   private readonly figures = new Figures();
   private readonly hitTest = new HitTest();
   private readonly wearer = new Wearer();
   private readonly immersion: Immersion;
   private placed = false;
+  private sharesRoom = false; // in the session that begins
+  private passesThrough = false;
+  private hasFloor = false; // of the real room
+  private looksForSurfaces = false; // the hit test is about to start
   private firstPoint: THREE.Vector3 | undefined;
   private move: { hands: TwoHandMove; left: Limb; right: Limb } | undefined;
   private frames = 0;
@@ -73,7 +80,7 @@ export class Headset {
       },
     });
     this.room.matrixAutoUpdate = false;
-    this.room.add(this.hitTest.reticle, this.seat);
+    this.room.add(this.hitTest.reticle, this.seat, this.realRoom.group);
     host.scene.add(this.room, this.figures.group);
     this.room.visible = this.figures.group.visible = false;
   }
@@ -93,9 +100,11 @@ export class Headset {
     return this.frames;
   }
 
-  // Call on a gesture of the user. `rate` is the frame rate of the stream, Hz.
-  enter(mode: Mode, rate: number): Promise<void> {
-    return this.immersion.enter(mode, rate);
+  // Call on a gesture of the user. `rate` is the frame rate of the stream, Hz. sharesRoom: in AR the headset detects the
+  // surfaces of the real room, which are drawn as shadows and go to the server (realRoom.shares). Ask the user first.
+  enter(mode: Mode, rate: number, sharesRoom = false): Promise<void> {
+    this.sharesRoom = sharesRoom;
+    return this.immersion.enter(mode, rate, sharesRoom);
   }
   leave(): Promise<void> {
     return this.immersion.leave();
@@ -132,6 +141,10 @@ export class Headset {
       this.body.send(client.input, this.placement.scale);
       this.wearer.send(client.wearing, this.body, frame, space, this.placement.inverse, this.placement.scale);
     }
+    const isMoving = this.doing !== "touch" || this.move !== undefined || this.looksForSurfaces;
+    this.realRoom.update(frame, space, this.placement, this.foot().applyMatrix4(this.placement.matrix), isMoving, client?.input.surfaces, nowMs);
+    const hasFloor = this.realRoom.counts.detected > 0;
+    if (hasFloor !== this.hasFloor) this.host.passThrough(this.passesThrough, (this.hasFloor = hasFloor));
     this.figures.place(this.body, this.placement.scale);
   }
 
@@ -237,7 +250,9 @@ export class Headset {
     const passThrough = mode === "immersive-ar" && session.environmentBlendMode !== "opaque";
     this.host.scene.matrixAutoUpdate = false;
     this.room.visible = this.figures.group.visible = true;
-    this.host.passThrough(passThrough);
+    this.passesThrough = passThrough;
+    this.host.passThrough(passThrough, (this.hasFloor = false));
+    if (mode === "immersive-ar" && this.sharesRoom) this.realRoom.begin(session);
     this.figures.passThrough = passThrough;
     this.placed = false;
     this.body.attach(session);
@@ -245,21 +260,26 @@ export class Headset {
     // The user has chosen a new origin or direction of the room.
     space?.addEventListener("reset", () => (this.placed = false));
     this.do("touch");
-    if (mode === "immersive-ar")
+    this.looksForSurfaces = mode === "immersive-ar";
+    if (this.looksForSurfaces)
       void this.hitTest
         .begin(session)
         .then(() => this.session === session && this.do("place"))
-        .catch(() => undefined);
+        .catch(() => undefined)
+        .finally(() => (this.looksForSurfaces = false));
     this.listener.entered?.(mode);
   }
 
   private left(): void {
-    this.host.change((input) => this.body.leave(input));
+    this.host.change((input) => {
+      this.body.leave(input);
+      this.realRoom.end(input.surfaces);
+    });
     this.hitTest.end();
     this.figures.clear();
     this.move = undefined;
     this.room.visible = this.figures.group.visible = false;
-    this.host.passThrough(false);
+    this.host.passThrough(false, false);
     this.place(() => this.placement.set(new THREE.Vector3(), 0, 1));
     this.doing = "touch";
     this.listener.left?.();

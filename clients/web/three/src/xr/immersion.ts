@@ -2,6 +2,7 @@
 // Sessions of VR and AR: which the browser offers, entering and leaving, frame rate and foveation.
 
 import type * as THREE from "three";
+import { kDetections } from "./detected_surfaces";
 
 export type Mode = "immersive-vr" | "immersive-ar";
 
@@ -36,12 +37,13 @@ export class Immersion {
   }
 
   // Starts a session, and ends the one before it. Call on a gesture of the user. Throws what the browser says if it
-  // refuses. `rate` is the frame rate that suits the stream, in Hz.
-  async enter(mode: Mode, rate: number): Promise<void> {
+  // refuses. `rate` is the frame rate that suits the stream, in Hz. `detects`: the session may detect the surfaces of the
+  // real room (AR only).
+  async enter(mode: Mode, rate: number, detects = false): Promise<void> {
     const { xr } = navigator;
     if (!xr) throw new Error("This browser has no WebXR");
     await this.leave();
-    const session = await xr.requestSession(mode, options(mode));
+    const session = await xr.requestSession(mode, options(mode, detects));
     // Another press may have started one meanwhile.
     if (this.session) return session.end();
     this.session = session;
@@ -75,11 +77,11 @@ export class Immersion {
   }
 }
 
-function options(mode: Mode): XRSessionInit {
+function options(mode: Mode, detects: boolean): XRSessionInit {
   const optional = ["local-floor", "hand-tracking", "body-tracking", "layers"];
   if (mode === "immersive-vr") return { optionalFeatures: optional };
   return {
-    optionalFeatures: [...optional, "hit-test", "anchors", "depth-sensing"],
+    optionalFeatures: [...optional, "hit-test", "anchors", "depth-sensing", ...(detects ? kDetections : [])],
     depthSensing: { usagePreference: ["gpu-optimized"], dataFormatPreference: ["luminance-alpha", "float32"] },
   } as XRSessionInit;
 }
