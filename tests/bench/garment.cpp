@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Suite garment: cost of a substep of cloth that follows joints.
+// Suite garment: cost of a substep of cloth that follows joints, and ticks of dressed figures.
 #include <algorithm>
 #include <cstddef>
 #include <memory>
@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "server/messages/scene_file.h"
 #include "server/model/cloth_skin.h"
 #include "tests/bench/simulated.h"
 #include "tests/bench/suite.h"
@@ -132,6 +133,31 @@ void addSheets(vulkan::Device& device, const Settings& settings, const RowSink& 
   }
 }
 
+// Ticks of as many scenes with a figure, one after the other, as a server runs them.
+Row figures(vulkan::Device& device, const Settings& settings, const std::string& name, std::size_t count) {
+  const auto scene = messages::loadScene(name);
+  if (!scene) throw std::runtime_error(scene.error().text);
+  std::vector<std::unique_ptr<Simulated>> running;
+  for (std::size_t i = 0; i < count; ++i)
+    running.push_back(std::make_unique<Simulated>(device, *scene, simulation::SimulationOptions{}));
+  Samples all;
+  double spent = 0;
+  for (std::uint64_t tick = 0; spent < settings.seconds || all.count() < 72; ++tick) {
+    const simulation::TickInputs inputs = simulation::inputsAt(*scene, tick);
+    const double seconds = secondsOf([&] {
+      for (const auto& simulated : running) simulated->tick(inputs);
+    });
+    all.add(seconds);
+    spent += seconds;
+  }
+  return Row{{"suite", "garment"},
+             {"scene", name},
+             {"nodes", scene->nodeCount()},
+             {"figures", count},
+             {"tickMsMedian", all.median() * 1e3},
+             {"tickMsP99", all.p99() * 1e3}};
+}
+
 }  // namespace
 
 void runGarment(vulkan::Device& device, const Settings& settings, const RowSink& add) {
@@ -140,6 +166,8 @@ void runGarment(vulkan::Device& device, const Settings& settings, const RowSink&
   for (const std::uint32_t size : sizes)
     for (const model::SolverKind solver : {model::SolverKind::massSpring, model::SolverKind::xpbd})
       addSheets(device, settings, add, size, solver);
+  for (const char* scene : {"dress", "gown"})
+    for (const std::size_t count : {1, 10}) add(figures(device, settings, scene, count));
 }
 
 }  // namespace clothstream::bench

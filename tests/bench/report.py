@@ -112,6 +112,15 @@ def self_collision(rows):
              number(r["crossings"]) if "crossings" in r else ""] for r in rows]
 
 
+def garment(rows):
+    return [[number(r["nodes"]), r["solver"], r["limits"], f"{number(r['nsMedian'])} / {number(r['nsMin'])}",
+             number(r["timesNotSkinned"], 2)] for r in rows if "limits" in r]
+
+
+def figures(rows):
+    return [[r["scene"], number(r["nodes"]), r["figures"], pair(r, "tickMs")] for r in rows if "figures" in r]
+
+
 def enforcement(rows):
     return [[number(r["nodes"]), number(r["springs"]), r["workgroups"], number(r["framesPerSecond"]),
              number(r["framesPerSecondBest"])] for r in rows]
@@ -166,6 +175,9 @@ TABLES = {
                                              "times without"], colliders_touching),
     "self_collision": ("self_collision", ["--size", "64"], ["case", "ns a node and substep", "tick, ms, median / p99",
                                                             "touching pairs", "crossings"], self_collision),
+    "garment": ("garment", [], ["nodes", "solver", "limits of the nodes", "ns a node and substep, median / min",
+                                "times not skinned"], garment),
+    "garment_figures": ("garment", [], ["scene", "nodes", "figures", "tick, ms, median / p99"], figures),
     "enforcement": ("enforcement", [], ["nodes", "springs", "workgroups", "frames/s", "best"], enforcement),
     "solvers": ("solvers", [], ["nodes", "solver", "substeps", "ns a node and substep, median / min", "strain, mean",
                                 "p99", "max"], solvers),
