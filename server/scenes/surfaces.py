@@ -288,3 +288,20 @@ def surface(field, low, high, length, cuts=(), rounds=6, step=0.024):
         result.turn()
         result.relax(length)
     return compact(result.points, [result.triangles[number] for number in sorted(result.triangles)])
+
+
+def runs(points, numbers):
+    """Numbers of points so that each eight in a row are near each other: halves along the widest axis."""
+    if len(numbers) <= 8:
+        return numbers
+    extents = [max(points[n][axis] for n in numbers) - min(points[n][axis] for n in numbers) for axis in range(3)]
+    axis = extents.index(max(extents))
+    numbers = sorted(numbers, key=lambda n: (points[n][axis], n))
+    half = (len(numbers) // 2 + 7) // 8 * 8
+    return runs(points, numbers[:half]) + runs(points, numbers[half:])
+
+
+def renumbered(points, triangles, order):
+    number = {old: new for new, old in enumerate(order)}
+    moved = [tuple(number[corner] for corner in triangle) for triangle in triangles]
+    return [points[old] for old in order], sorted(moved, key=lambda triangle: (min(triangle), triangle))

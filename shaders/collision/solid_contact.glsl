@@ -13,6 +13,8 @@
 // A path is searched for its first crossing in at most this number of strides.
 const uint kStrides = 32u;
 const float kLeastStride = 1.0 / 32.0;  // as a share of the path
+// Far above the rounding of a distance, m.
+const float kReachSlack = 1e-3;
 // Normals whose product is above this are on one side. The sides of a box are not, whatever the rounding.
 const float kSameSide = 0.01;
 
@@ -42,9 +44,9 @@ SolidContact leaveAt(Nearest entry, Nearest end, vec3 to, float left, float thic
 // Seen from a node, the distance from the mesh changes at most by the length of its path and the motion of
 // the mesh, together `way`. So a path whose ends are far enough outside cannot cross the surface. Any other
 // path is followed in strides of the distance from the mesh, or of kLeastStride of the path if that is
-// longer. All its searches together visit at most kMostSolidVisits nodes of the tree. The substep begins and
-// ends at shares of the tick. No vertex moves farther in the tick than
-// `motion`.
+// longer. Searches after the first one end at the greatest distance that the surface can then have. All
+// searches together visit at most kMostSolidVisits nodes of the tree. The substep begins and ends at shares of
+// the tick. No vertex moves farther in the tick than `motion`.
 SolidContact touchSolid(SolidRecord solid, vec3 from, vec3 to, float begins, float ends, float motion,
                         float thickness) {
   precise vec3 path = to - from;
@@ -52,7 +54,8 @@ SolidContact touchSolid(SolidRecord solid, vec3 from, vec3 to, float begins, flo
   float squared = dotProduct(path, path);
   precise float way = squared * reciprocalSquareRoot(max(squared, 1e-24)) + substep * motion;
   float inverse = reciprocal(max(way, 1e-12));
-  precise float bound = way + max(thickness, kSolidDepth);
+  precise float reach = way + max(thickness, kSolidDepth);
+  float bound = reach;
   SolidContact none = SolidContact(kNoContact, vec3(0.0));
   Nearest entry = Nearest(false, 0.0, vec3(0.0), vec3(0.0), vec3(0.0));
   Nearest end = entry;
@@ -72,6 +75,8 @@ SolidContact touchSolid(SolidRecord solid, vec3 from, vec3 to, float begins, flo
         return none;
       }
       entered = here.distance < 0.0;
+      precise float farthest = abs(here.distance) + way + kReachSlack;
+      bound = isSampled(solid) ? bound : min(bound, farthest);
     } else if (query == 1u) {
       end = here;
       precise float both = entry.distance + end.distance;

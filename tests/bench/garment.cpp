@@ -166,8 +166,7 @@ void runGarment(vulkan::Device& device, const Settings& settings, const RowSink&
   for (const std::uint32_t size : sizes)
     for (const model::SolverKind solver : {model::SolverKind::massSpring, model::SolverKind::xpbd})
       addSheets(device, settings, add, size, solver);
-  for (const char* scene : {"dress", "gown"})
-    for (const std::size_t count : {1, 10}) add(figures(device, settings, scene, count));
+  for (const std::size_t count : {1, 10}) add(figures(device, settings, "dress", count));
 }
 
 }  // namespace clothstream::bench
