@@ -126,7 +126,7 @@ def write(name, description, body, cloths, settings):
 def main():
     body = Body(0.042)
     settings = {"material": "cotton", "thickness": 0.006, "friction": 0.3, "damping": 0.5, "tethers": {},
-                "solver": {"xpbd": {"iterations": 5}}}
+                "solver": {"xpbd": {"iterations": 6}}}
     write("dress", "A figure in a dress walks in a circle. The bodice follows its joints, the skirt swings.", body,
           [dress(settings)], {"substeps": 4})
 
