@@ -116,7 +116,7 @@ SolidContact touchSolid(SolidRecord solid, vec3 from, vec3 to, float begins, flo
       }
       entered = here.distance < 0.0;
       precise float farthest = abs(here.distance) + way + kReachSlack;
-      bound = isSampled(solid) ? bound : min(bound, farthest);
+      bound = isSampled(solid) ? reach : min(reach, farthest);
     } else if (query == 1u) {
       end = here;
       precise float both = entry.distance + end.distance;
