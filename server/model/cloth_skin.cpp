@@ -60,17 +60,23 @@ std::vector<Eigen::Vector3d> placesOf(const ClothSkin& clothSkin, const Cloth& c
   return places;
 }
 
-std::vector<Vec3> startPlaces(const ClothSkin& clothSkin, const Cloth& cloth, const Collider& collider,
-                              const Vec3& origin) {
+// Places of the nodes at a simulated time, relative to a point.
+std::vector<Eigen::Vector3d> placesAt(double seconds, const ClothSkin& clothSkin, const Cloth& cloth,
+                                      const Collider& collider, const Vec3& origin) {
   const Skin& skin = *std::get<Solid>(collider.shape)->skin;
   std::vector<Pose> local, joints;
-  jointsAt(skin, 0, local);
+  jointsAt(skin, seconds, local);
   compose(skin, local, joints);
-  Pose pose = poseAt(collider, 0);
+  Pose pose = poseAt(collider, seconds);
   pose.position -= origin;
+  return placesOf(clothSkin, cloth, skin, pose, joints);
+}
+
+std::vector<Vec3> startPlaces(const ClothSkin& clothSkin, const Cloth& cloth, const Collider& collider,
+                              const Vec3& origin) {
   std::vector<Vec3> positions;
   positions.reserve(cloth.nodeCount());
-  for (const Eigen::Vector3d& place : placesOf(clothSkin, cloth, skin, pose, joints))
+  for (const Eigen::Vector3d& place : placesAt(0, clothSkin, cloth, collider, origin))
     positions.emplace_back(place.cast<float>());
   return positions;
 }
@@ -96,6 +102,20 @@ std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth, const V
 std::vector<Eigen::Vector3d> skinnedPlaces(const Cloth& cloth, const Skin& skin, const Pose& collider,
                                            std::span<const Pose> joints) {
   return placesOf(*cloth.skin, cloth, skin, collider, joints);
+}
+
+std::vector<Vec3> startVelocities(const Scene& scene, const Cloth& cloth) {
+  std::vector<Vec3> velocities(cloth.nodeCount(), Vec3::Zero());
+  if (!cloth.skin) return velocities;
+  const Collider& collider = scene.colliders[skinCollider(scene, cloth)];
+  const std::vector<std::uint8_t> pinned = pinnedNodes(cloth);
+  const auto places = placesAt(0, *cloth.skin, cloth, collider, Vec3::Zero()),
+             later = placesAt(scene.tickSeconds(), *cloth.skin, cloth, collider, Vec3::Zero());
+  for (std::size_t node = 0; node < velocities.size(); ++node) {
+    const Eigen::Vector3d velocity = (later[node] - places[node]) * scene.simulationRate;
+    if (pinned[node] == 0 && velocity.norm() < kMaxAttachmentSpeed) velocities[node] = velocity.cast<float>();
+  }
+  return velocities;
 }
 
 std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth) {

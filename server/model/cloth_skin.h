@@ -60,5 +60,8 @@ std::vector<Vec3> restNormals(const Cloth& cloth);
 // cloth has a skin, else the rest positions.
 std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth);
 std::vector<Vec3> startPositions(const Scene& scene, const Cloth& cloth, const Vec3& origin);
+// Velocities of the nodes at simulated time 0: that of the skinned place in the first tick, unless it jumps.
+// 0 for nodes that are pinned, and for cloth without a skin.
+std::vector<Vec3> startVelocities(const Scene& scene, const Cloth& cloth);
 
 }  // namespace clothstream::model

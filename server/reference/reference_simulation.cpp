@@ -63,6 +63,9 @@ ReferenceSimulation::ReferenceSimulation(const model::Scene& scene)
     const std::vector<model::Vec3> start = model::startPositions(scene, scene.cloths[i]);
     std::ranges::transform(start, cloths_[i].positions().begin(),
                            [](const model::Vec3& position) -> Vec3 { return position.cast<double>(); });
+    const std::vector<model::Vec3> velocities = model::startVelocities(scene, scene.cloths[i]);
+    std::ranges::transform(velocities, cloths_[i].velocities().begin(),
+                           [](const model::Vec3& velocity) -> Vec3 { return velocity.cast<double>(); });
   }
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
     if (scene.cloths[i].coarse)

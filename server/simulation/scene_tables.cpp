@@ -164,7 +164,13 @@ NodeState restState(std::span<const model::Cloth> cloths) {
 
 NodeState startState(const model::Scene& scene, const model::Vec3& origin) {
   NodeState state;
-  for (const model::Cloth& cloth : scene.cloths) append(model::startPositions(scene, cloth, origin), state);
+  for (const model::Cloth& cloth : scene.cloths) {
+    append(model::startPositions(scene, cloth, origin), state);
+    const std::vector<model::Vec3> velocities = model::startVelocities(scene, cloth);
+    std::ranges::transform(velocities,
+                           state.velocities.end() - static_cast<std::ptrdiff_t>(velocities.size()),
+                           [](const model::Vec3& v) { return model::Vec3(v.unaryExpr(&snapTiny)); });
+  }
   return state;
 }
 

@@ -14,7 +14,7 @@
 namespace clothstream::bench {
 namespace {
 
-constexpr const char* kFigureScene = "walker";
+constexpr const char* kFigureScene = "dress";
 
 // Ticks of as many scenes with a figure, one after the other, as a server runs them. All move alike, so that
 // their states must be the same.

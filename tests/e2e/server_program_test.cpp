@@ -149,7 +149,7 @@ TEST_F(ServerProgram, ListsTheScenesForAnUnknownName) {
   ServerProcess server({"--scene", "nowhere"});
   EXPECT_EQ(server.exitCode(), 1);
   EXPECT_THAT(server.output(),
-              HasSubstr("there is no scene 'nowhere'; there are balloon, curtain, cushion, figure_07"));
+              HasSubstr("there is no scene 'nowhere'; there are balloon, curtain, cushion, dress, figure_07"));
 }
 
 TEST_F(ServerProgram, RefusesTooFewSubsteps) {

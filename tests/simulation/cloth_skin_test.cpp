@@ -220,6 +220,27 @@ TEST_F(ClothSkins, StartsWhereItsAnimationStarts) {
   EXPECT_GT((start.positions.back() - model::restPositions(scene.cloths[0]).back()).norm(), 0.1f);
 }
 
+TEST_F(ClothSkins, StartsWithTheVelocityOfItsAnimation) {
+  model::Scene scene = sleeveScene(calmCloth(kRows, kColumns));
+  const model::Solid& rod = std::get<model::Solid>(scene.colliders[0].shape);
+  model::ClosedMesh animated = *rod;
+  std::vector<model::Pose> straight = model::restJoints(*rod->skin), bent = straight;
+  bent[1].orientation = turned(60, model::Vec3::UnitZ());
+  animated.skin->keys = {{0, straight}, {1, bent}, {2, straight}};
+  scene.colliders[0].shape = std::make_shared<const model::ClosedMesh>(std::move(animated));
+  const MovingCollider collider = simulation::inputsAt(scene, 0).colliders[0];
+  const std::vector<Eigen::Vector3d> places = placesAfter(scene, collider);
+  const NodeState start = simulation::startState(scene, model::Vec3::Zero());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    Eigen::Vector3d velocity = (places[i] - start.positions[i].cast<double>()) * scene.simulationRate;
+    if (scene.cloths[0].skin->limits[i].followsExactly()) velocity.setZero();
+    ASSERT_LT((start.velocities[i].cast<double>() - velocity).norm(), kPlaceError * scene.simulationRate)
+        << "node " << i;
+  }
+  // The elbow turns by a radian in a second, and the last node is 16 cm away.
+  EXPECT_GT(start.velocities.back().norm(), 0.1f);
+}
+
 // Gravity is along the axis of the turn, so the motion after the jump is that without it, moved.
 TEST_F(ClothSkins, AJumpTakesTheClothAlongAsARigidBody) {
   const model::Scene scene = sleeveScene(calmCloth(kRows, kColumns));
