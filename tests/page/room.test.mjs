@@ -122,8 +122,8 @@ test("a cloth lies on the real desk and hangs over its edge, for two headsets al
 
     // Looks at the desk from the side.
     await first.evaluate(() => {
-      window.device.position.set(0.75, 1.25, 0.45);
-      const [yaw, pitch] = [0.55, -0.5];
+      window.device.position.set(0.5, 1.15, 0.25);
+      const [yaw, pitch] = [0.55, -0.6];
       const [sy, cy, sp, cp] = [Math.sin(yaw / 2), Math.cos(yaw / 2), Math.sin(pitch / 2), Math.cos(pitch / 2)];
       window.device.quaternion.set(cy * sp, sy * cp, -sy * sp, cy * cp);
     });

@@ -112,10 +112,14 @@ export class RealRoom {
     return false;
   }
 
-  // The server has refused a mesh for now: all surfaces are sent again after a pause.
+  // The server has refused a surface, and does not say which: half as much is sent after a pause. Nothing is shared any more
+  // if that is too little.
   tryLater(nowMs: number): void {
-    this.sent.clear();
+    this.shares &&= this.mostSurfaces > 1;
+    this.mostTriangles = Math.max(kFewest, Math.floor(this.mostTriangles / 2));
+    this.mostSurfaces = Math.max(1, Math.floor(this.mostSurfaces / 2));
     this.readAt = nowMs + kPauseMs;
+    for (const known of this.sent.values()) known.version = -1;
   }
 
   // Takes everything back, at the end of a session. `surfaces` are those of the present client.

@@ -8,10 +8,10 @@ export interface RoomMesh {
   triangles: Uint32Array; // three vertices of each triangle, counter-clockwise seen from the front
 }
 
-// A flat part of the room: a polygon in the plane y = 0 of its own frame.
+// A flat part of the room: a polygon in the plane y = 0 of a frame.
 export interface FlatPart {
   corners: readonly THREE.Vector2[]; // x and z
-  fromRoom: THREE.Matrix4; // from the room into its frame
+  fromRoom: THREE.Matrix4; // from the room into that frame
 }
 
 // Largest coordinate of a vertex, m. Larger ones are errors of the device.
@@ -86,7 +86,7 @@ export function withoutFlatParts(mesh: RoomMesh, toRoom: THREE.Matrix4, flatPart
   return picked(positions, Array.from(triangles).filter((_, index) => flat[Math.floor(index / 3)] === 0));
 }
 
-// The triangles that are nearest to a point of the mesh's frame, at most `most` of them. Undefined if that is none.
+// The triangles that are nearest to a point of the mesh's frame, at most `most` of them. Undefined if `most` is 0.
 export function nearestTriangles(mesh: RoomMesh, centre: THREE.Vector3, most: number): RoomMesh | undefined {
   const { positions, triangles } = mesh;
   const count = triangles.length / 3;
@@ -101,7 +101,9 @@ export function nearestTriangles(mesh: RoomMesh, centre: THREE.Vector3, most: nu
   // Sorted by distance, and those of the same distance by number, so that the choice does not flicker.
   const order = Uint32Array.from(distances, (_, index) => index).sort((a, b) => distances[a]! - distances[b]! || a - b);
   const chosen = order.slice(0, most).sort();
-  return picked(positions, Array.from(chosen).flatMap((triangle) => [triangles[3 * triangle]!, triangles[3 * triangle + 1]!, triangles[3 * triangle + 2]!]));
+  const corners = new Uint32Array(3 * chosen.length);
+  chosen.forEach((triangle, index) => corners.set(triangles.subarray(3 * triangle, 3 * triangle + 3), 3 * index));
+  return picked(positions, corners);
 }
 
 export function isSameMesh(a: RoomMesh, b: RoomMesh): boolean {
@@ -140,7 +142,7 @@ function isNearPolygon(corners: readonly THREE.Vector2[], x: number, y: number):
 }
 
 // A mesh of these triangles and the vertices that they have. Undefined without triangles.
-function picked(vertices: ArrayLike<number>, triangles: readonly number[]): RoomMesh | undefined {
+function picked(vertices: ArrayLike<number>, triangles: readonly number[] | Uint32Array): RoomMesh | undefined {
   if (triangles.length === 0) return undefined;
   const numbers = new Int32Array(vertices.length / 3).fill(-1);
   const positions: number[] = [];
