@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Makes docs/picture.png and docs/cloth.webp: the page with a collider in the curtain, and one swing of the collider.
+// Makes docs/images/dress.png: the figure of the scene "dress".
 //   CLOTHSTREAM_SERVER=build/release/bin/clothstream-server node tests/page/picture.mjs
 // Needs Chromium, and img2webp of Debian's package webp.
 
@@ -15,7 +16,10 @@ const kDocs = fileURLToPath(new URL("../../docs/", import.meta.url));
 const kDesktop = { width: 1280, height: 800 };
 const kMoving = { width: 560, height: 400 };
 const kSwing = 5; // s, period of the collider's motion
+const kSmall = { width: 640, height: 480 };
+const kFigure = { x: 0, y: 80, width: 300, height: 250 }; // part of the page where the figure then is, in pixels
 const kStart = 6.25; // s, after the first swing
+const kWalked = 4; // s, when the figure comes towards the camera
 const kFramesPerSecond = 12;
 const kSlow = 0.1; // speed of the playback while frames are taken
 
@@ -47,6 +51,15 @@ try {
   await untilSecond(page, 7);
   await page.screenshot({ path: join(kDocs, "picture.png") });
   await page.close();
+  await server.stop();
+
+  server = await startServer(0, ["--scene", "dress"]);
+  const dressed = await openPage(browser, server.url, { viewport: kSmall });
+  await untilState(dressed, "live");
+  await dressed.addStyleTag({ content: "#notice, .card { display: none !important; }" });
+  await untilSecond(dressed, kWalked);
+  await dressed.screenshot({ path: join(kDocs, "images", "dress.png"), clip: kFigure });
+  await dressed.close();
   await server.stop();
 
   server = await startServer(0, ["--scene", "curtain", "--record", folder]);
