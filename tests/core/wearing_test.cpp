@@ -45,9 +45,25 @@ void addFigure(v1::StreamDescription& description, const std::string& name, cons
 class Wearing : public ::testing::Test {
  protected:
   Wearing() {
-    client_.receive(server_.welcome());
+    client_.receive(welcome());
     describe(tests::figure());
     client_.outgoing();
+  }
+
+  // Welcome of a server at which this participant wears a body; without one, it does not know the
+  // participant.
+  std::string welcome(const std::string& body = {}) const {
+    v1::ServerMessage message;
+    message.ParseFromString(server_.welcome());
+    v1::Welcome& welcome = *message.mutable_welcome();
+    welcome.set_resume_token("0123456789abcdef");
+    welcome.set_hold_ms(60'000);
+    welcome.set_resumed(!body.empty());
+    v1::Participant& own = *welcome.add_participants();
+    own.set_id(42);
+    own.set_role(v1::ROLE_PARTICIPANT);
+    own.set_body(body);
+    return message.SerializeAsString();
   }
 
   void describe(const Hull& figure) {
@@ -213,17 +229,13 @@ TEST_F(Wearing, TakesTheBodyAgainFromAServerThatHasForgottenIt) {
   cs_tracked_body tracked = standing();
   cs_wear(client(), "avatar");
   announce("avatar");
+  std::uint64_t nowUs = 0;
   const auto returned = [&](const std::string& body) {
-    cs_disconnected(client(), 1000);
-    cs_connecting(client(), 2000);
+    cs_disconnected(client(), nowUs += 1000);
+    EXPECT_EQ(cs_get_state(client()), CS_STATE_RECONNECTING);
+    cs_connecting(client(), nowUs += 1000);
     client_.outgoing();
-    v1::ServerMessage message;
-    message.ParseFromString(server_.welcome());
-    v1::Participant& own = *message.mutable_welcome()->add_participants();
-    own.set_id(42);
-    own.set_body(body);
-    message.mutable_welcome()->set_resumed(!body.empty());
-    client_.receive(message.SerializeAsString(), 3000);
+    client_.receive(welcome(body), nowUs += 1000);
     std::string taken;
     for (const v1::ClientMessage& sent : client_.outgoing())
       if (sent.has_wear_body()) taken += sent.wear_body().collider();
