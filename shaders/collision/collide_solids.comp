@@ -24,7 +24,7 @@ layout(std430, binding = 5) buffer Velocities {
   vec4 velocities[];
 };
 
-// Of the node and the first mesh, written in each substep. What an earlier tick wrote is not used.
+// Clearances of nodes from the first mesh, written in each substep. Those of an earlier tick are not used.
 layout(std430, binding = 8) buffer Clearances {
   vec4 clearances[];  // Clearance
 };

@@ -167,7 +167,7 @@ TEST(Humanoids, AreSeenFromTheNeckDownByThemselves) {
   const Hull mesh = client::tests::figure();
   const Humanoid body = humanoid(mesh);
   const std::vector<std::uint32_t> corners = trianglesBelowNeck(body, mesh);
-  // Of the head three triangles are hidden, and one of the neck.
+  // Three triangles of the head are hidden, and one of the neck.
   EXPECT_EQ(corners.size(), mesh.triangles.size() - 3u * 4);
   for (const std::uint32_t corner : corners) EXPECT_LT(mesh.vertices[3 * corner + 1], 1.4f);
 }

@@ -188,7 +188,7 @@ class WornBody : public MovedJoints {
     });
     return nearest;
   }
-  // What the client has heard: names of the worn bodies, and the newest error.
+  // The client has heard: names of the worn bodies, and the newest error.
   static std::string wornIn(NativeClient& client) {
     std::string worn;
     client.visit([&](cs_client* core) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What counts as a jump, and which cloths go along.
+// Motions that count as jumps, and cloths that go along.
 #include "server/model/jump.h"
 
 #include <cmath>

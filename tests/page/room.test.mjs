@@ -233,7 +233,7 @@ test("with the policy everyone, others see the room, and the page says so before
       await untilShared(page);
       const { sent } = await page.evaluate(() => window.clothstream.headset.room);
       await watcher.waitForFunction((wanted) => window.clothstream.roomSurfaces === wanted, sent);
-      // One that joins later gets them too.
+      // A page that joins later gets them too.
       const late = await openPage(browser, `${other.url}?name=Late`);
       await late.waitForFunction((wanted) => window.clothstream?.roomSurfaces === wanted, sent);
       await takePicture(late, "room_of_another");

@@ -67,7 +67,7 @@ class FakeSurfaces {
     this.log.push(`remove ${id}`);
     return this.has.delete(id);
   }
-  // What has happened since the last call.
+  // Events since the last call.
   take(): string[] {
     return this.log.splice(0);
   }

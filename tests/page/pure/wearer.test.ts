@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a headset knows of its user, for the body that the user wears: body tracking, hands and controllers.
+// Knowledge of a headset about its user, for the body that the user wears: body tracking, hands and controllers.
 
 import * as THREE from "three";
 import { assert, test } from "vitest";

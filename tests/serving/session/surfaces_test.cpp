@@ -204,7 +204,7 @@ TEST_F(SurfacesTest, AreSentToEveryoneIfThatIsThePolicy) {
   EXPECT_EQ(seen.vertices.size(), surface.vertex_count());
   EXPECT_EQ(seen.triangles.size(), 5000u);
 
-  // One that joins later has them at once. A new pose and a new mesh are announced.
+  // A client that joins later has them at once. A new pose and a new mesh are announced.
   TestPeer late(server());
   late.join();
   const std::uint64_t revision = surface.revision();

@@ -5,7 +5,7 @@ import { CS_ROOM_SURFACE_VERSION, CS_SURFACE_VERSION, cs_room_surface, cs_surfac
 import { readFloats, vec3, writeFloats, type CoreHandle } from "./handle";
 import type { Quaternion, Vec3 } from "./types";
 
-// What the server does with surfaces.
+// Use that the server makes of surfaces.
 export enum SurfacePolicy {
   unknown = 0, // not connected yet, or the server is of a release that knows no surfaces
   off = 1, // it refuses them

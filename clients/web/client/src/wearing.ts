@@ -22,14 +22,14 @@ export interface BodyPose {
   orientation: Quaternion;
 }
 
-// What is known of a person, in the scene, metres. Parts that are not tracked are left out.
+// Known parts of a person, in the scene, metres. Parts that are not tracked are left out.
 export interface TrackedBody {
   floor: number; // height
   head: BodyPose; // between the eyes; looks along -Z
   // Wrists: the fingers point along -Z, and the back of the hand to +Y.
   leftHand?: BodyPose;
   rightHand?: BodyPose;
-  // Of body tracking.
+  // Parts that body tracking gives.
   hips?: Vec3;
   leftElbow?: Vec3;
   rightElbow?: Vec3;

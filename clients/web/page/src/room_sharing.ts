@@ -112,7 +112,7 @@ export class RoomSharing {
     return state.kind === "live" && this.policy >= SurfacePolicy.own && Roles.get(client.people.role) !== "viewer";
   }
 
-  // Who receives the shape.
+  // Receivers of the shape.
   private get receivers(): string {
     const { client } = this.session;
     const server = `The server ${window.location.host} uses the shape for the cloth`;

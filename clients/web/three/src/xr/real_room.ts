@@ -33,7 +33,7 @@ interface Drawn {
   version: number;
 }
 
-// What the server has of a surface.
+// Shape and place of a surface that the server has.
 interface Sent {
   version: number;
   scale: number;
@@ -52,7 +52,7 @@ export class RealRoom {
   private readonly drawn = new Map<number, Drawn>();
   private readonly sent = new Map<number, Sent>();
   private surfaces: Surfaces | undefined; // that have them
-  // What the server has room for: triangles of all surfaces together, and surfaces.
+  // Room at the server: triangles of all surfaces together, and surfaces.
   private mostTriangles = kMostSurfaceTriangles;
   private mostSurfaces = kMostSurfaces;
   private readonly leftOut = new Set<number>(); // surfaces for which the server has no room
