@@ -19,7 +19,7 @@ struct Participant {
   std::uint64_t id = 0;
   std::string displayName, clientName;
   Role role = Role::none;
-  bool away = false;  // disconnected; it may come back
+  bool away = false;   // disconnected; it may come back
   std::string body{};  // name of the collider that it wears; empty for none
 };
 void write(const Participant& participant, v1::Participant& message);

@@ -355,9 +355,9 @@ struct Session::Messages {
     scene::LiveScene& scene = *session.scene_;
     scene::Roster& roster = scene.roster;
     if (scene.source)
-      return session.refuse({v1::ERROR_CODE_INVALID_ARGUMENT,
-                             fmt::format("wearBody: '{}' {}; its bodies cannot be worn", scene.name(),
-                                         scene.source->whyFixed())});
+      return session.refuse(
+          {v1::ERROR_CODE_INVALID_ARGUMENT, fmt::format("wearBody: '{}' {}; its bodies cannot be worn",
+                                                        scene.name(), scene.source->whyFixed())});
     auto worn = messages::toWornBody(message.wear_body(), scene.start());
     if (!worn) return session.refuse(worn.error());
     const std::string before = roster.bodyOf(*session.mailbox_);

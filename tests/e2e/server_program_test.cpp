@@ -148,8 +148,9 @@ TEST_F(ServerProgram, NamesPortAndOptionWhenAPortIsInUse) {
 TEST_F(ServerProgram, ListsTheScenesForAnUnknownName) {
   ServerProcess server({"--scene", "nowhere"});
   EXPECT_EQ(server.exitCode(), 1);
-  EXPECT_THAT(server.output(),
-              HasSubstr("there is no scene 'nowhere'; there are balloon, curtain, cushion, dress, figure_07"));
+  EXPECT_THAT(
+      server.output(),
+      HasSubstr("there is no scene 'nowhere'; there are balloon, curtain, cushion, dress, figure_07"));
 }
 
 TEST_F(ServerProgram, RefusesTooFewSubsteps) {

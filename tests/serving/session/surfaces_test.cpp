@@ -15,7 +15,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using tests::TestPeer;
-using Body = v1::ServerMessage::BodyCase;
+using Body = v1::ServerMessage;
 
 // A mesh in parts of this number of vertices and triangles.
 std::vector<v1::ClientMessage> partsOf(std::uint32_t id, const model::Triangles& mesh, std::size_t each,
