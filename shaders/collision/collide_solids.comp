@@ -6,7 +6,7 @@
 
 const int kSolidBinding = 2;
 const int kContactImpulseBinding = 6;
-const int kColliderBinding = 7;  // the lists of near colliders are not used
+const int kColliderBinding = 8;  // the lists of near colliders are not used
 
 #include "shaders/collision/collide.glsl"
 #include "shaders/collision/solid_contact.glsl"
@@ -25,7 +25,7 @@ layout(std430, binding = 5) buffer Velocities {
 };
 
 // Of the node and the first mesh, written in each substep. What an earlier tick wrote is not used.
-layout(std430, binding = 8) buffer Clearances {
+layout(std430, binding = 7) buffer Clearances {
   vec4 clearances[];  // Clearance
 };
 

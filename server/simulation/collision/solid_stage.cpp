@@ -37,7 +37,7 @@ SolidStage::SolidStage(const vulkan::Device& device, const SolidTables& tables,
                             return BufferList{
                                 &state.cloths,          &tiles_.texels(),    &solids_.texels(),
                                 state.positions[from],  state.positions[to], state.velocities[to],
-                                &state.contactImpulses, &state.colliders,    &clearances_};
+                                &state.contactImpulses, &clearances_,        &state.colliders};
                           })) {
   for (std::size_t i = 0; i < tables.solids.size(); ++i) {
     const model::ClosedMesh& mesh = *tables.solids[i];
