@@ -24,46 +24,23 @@ layout(std430, binding = 5) buffer Velocities {
   vec4 velocities[];
 };
 
-// Clearances of nodes from the first mesh, written in each substep. Those of an earlier tick are not used.
-layout(std430, binding = 8) buffer Clearances {
-  vec4 clearances[];  // Clearance
-};
-
 layout(push_constant) uniform Push {
   SolidPush push;
 };
 
-Clearance clearanceOf(uint solid, uint node) {
-  if (solid > 0u || push.collision.progressBefore == 0.0) {
-    return kUnknown;
-  }
-  vec4 kept = clearances[node];
-  return Clearance(kept.xyz, kept.w);
-}
-
-void keep(uint solid, uint node, Clearance clearance) {
-  if (solid == 0u) {
-    clearances[node] = vec4(clearance.place, clearance.distance_);
-  }
-}
-
 // Velocity and mass stay in their buffers during the search, which needs nearly all registers.
-void collideWithSolid(uint ofSolids, CollidingNode node, vec3 from, inout Press last, inout vec3 position) {
-  uint number = push.collision.colliderCount + ofSolids;
+void collideWithSolid(uint number, CollidingNode node, vec3 from, inout Press last, inout vec3 position) {
   Collider collider = fetchCollider(number, push.collision, node.thickness, node.friction);
   if (!mayTouch(collider, from, position)) {
-    keep(ofSolids, node.index, kUnknown);
     return;
   }
   ColliderFrame frame = fetchFrame(collider, push.collision);
   SolidRecord solid = solidRecordAt(solids, solidTexelOf(frame.shape));
   precise vec3 before = from - collider.before;
   precise vec3 after = position - collider.after;
-  Clearance clearance = clearanceOf(ofSolids, node.index);
   SolidContact touch = touchSolid(solid, rotateBack(frame.before, before), rotateBack(frame.after, after),
                                   push.collision.progressBefore, push.collision.progressAfter,
-                                  solidMotionOf(frame.shape), node.thickness, clearance);
-  keep(ofSolids, node.index, clearance);
+                                  solidMotionOf(frame.shape), node.thickness);
   if (touch.contact.depth > 0.0) {
     touch.contact.normal = rotate(frame.after, touch.contact.normal);
     precise vec3 surface = collider.velocity + push.collision.tickRate * rotate(frame.after, touch.motion);
@@ -92,7 +69,7 @@ void main() {
   CollidingNode node = CollidingNode(index, uint(tile.cloth), 0.0, cloth.thickness, cloth.friction);
   Press last = kNoPress;
   for (uint solid = 0u; solid < push.solidCount; ++solid) {
-    collideWithSolid(solid, node, from, last, position);
+    collideWithSolid(push.collision.colliderCount + solid, node, from, last, position);
   }
   node.inverseMass = positions[index].w;
   vec3 velocity = velocities[index].xyz;

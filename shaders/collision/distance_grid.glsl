@@ -73,13 +73,9 @@ Nearest nearestInGrid(SolidRecord solid, vec3 p, float bound) {
   return Nearest(abs(distance_) < bound, distance_, point, normal, vec3(0.0));
 }
 
-bool isSampled(SolidRecord solid) {
-  return kGrids && (!kTriangles || solid.firstGrid > 0.0);
-}
-
 // The nearest point of a mesh: on its triangles, or where its grid of distances says.
 Nearest nearestPoint(SolidRecord solid, float progress, vec3 p, float bound) {
-  if (isSampled(solid)) {
+  if (kGrids && (!kTriangles || solid.firstGrid > 0.0)) {
     return nearestInGrid(solid, p, bound);
   }
   return nearestOnSolid(solid, progress, p, bound);

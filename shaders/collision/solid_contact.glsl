@@ -13,8 +13,6 @@
 // A path is searched for its first crossing in at most this number of strides.
 const uint kStrides = 32u;
 const float kLeastStride = 1.0 / 32.0;  // as a share of the path
-// Far above the rounding of a distance, m.
-const float kReachSlack = 1e-3;
 // Normals whose product is above this are on one side. The sides of a box are not, whatever the rounding.
 const float kSameSide = 0.01;
 
@@ -41,60 +39,21 @@ SolidContact leaveAt(Nearest entry, Nearest end, vec3 to, float left, float thic
   return SolidContact(Contact(entry.normal, depth), entry.motion);
 }
 
-// What the last search of a node in this tick tells about its distance from a mesh.
-struct Clearance {
-  vec3 place;  // of the node at the search's end, in the frame of the mesh
-  // m. Above 0: the node was outside, and at least as far away. Below 0: it was on either side, and at least
-  // -distance_ away. 0: nothing is known.
-  float distance_;
-};
-
-const Clearance kUnknown = Clearance(vec3(0.0), 0.0);
-
-float lengthOf(vec3 v) {
-  float squared = dotProduct(v, v);
-  precise float length_ = squared * reciprocalSquareRoot(max(squared, 1e-24));
-  return length_;
-}
-
 // Seen from a node, the distance from the mesh changes at most by the length of its path and the motion of
 // the mesh, together `way`. So a path whose ends are far enough outside cannot cross the surface. Any other
 // path is followed in strides of the distance from the mesh, or of kLeastStride of the path if that is
-// longer. Searches after the first one end at the greatest distance that the surface can then have. All
-// searches together visit at most kMostSolidVisits nodes of the tree. The substep begins and ends at shares
-// of the tick. No vertex moves farther in the tick than `motion`.
-//
-// A node that is known to be far away is not searched for. The first search goes farther than a contact
-// needs, so that this is known of most nodes in the next substeps.
+// longer. All its searches together visit at most kMostSolidVisits nodes of the tree. The substep begins and
+// ends at shares of the tick. No vertex moves farther in the tick than
+// `motion`.
 SolidContact touchSolid(SolidRecord solid, vec3 from, vec3 to, float begins, float ends, float motion,
-                        float thickness, inout Clearance known) {
+                        float thickness) {
   precise vec3 path = to - from;
   precise float substep = ends - begins;
-  precise float way = lengthOf(path) + substep * motion;
+  float squared = dotProduct(path, path);
+  precise float way = squared * reciprocalSquareRoot(max(squared, 1e-24)) + substep * motion;
   float inverse = reciprocal(max(way, 1e-12));
-  float deepest = max(thickness, kSolidDepth);
-  precise float reach = way + deepest;
+  precise float bound = way + max(thickness, kSolidDepth);
   SolidContact none = SolidContact(kNoContact, vec3(0.0));
-  bool outside = known.distance_ > 0.0;
-  if (known.distance_ != 0.0) {
-    precise vec3 apart = from - known.place;
-    precise float left = abs(known.distance_) - lengthOf(apart) - kReachSlack - way;
-    if (left >= (outside ? thickness : deepest)) {
-      known = Clearance(to, outside ? left : -left);
-      return none;
-    }
-    precise float leftBefore = left + way;
-    outside = outside && leftBefore > 0.0;
-  }
-  float bound = reach;
-  if (!isSampled(solid)) {
-    // One more substep for a node outside, and for all others those until the tick's end.
-    precise float later = (1.0 - ends) * reciprocal(max(substep, 1e-6)) * way;
-    precise float near = way + thickness + kReachSlack + way;
-    precise float far = reach + min(later, kSolidDepth);
-    bound = outside ? near : far;
-  }
-  known = kUnknown;
   Nearest entry = Nearest(false, 0.0, vec3(0.0), vec3(0.0), vec3(0.0));
   Nearest end = entry;
   visitsLeft = kMostSolidVisits;
@@ -109,14 +68,10 @@ SolidContact touchSolid(SolidRecord solid, vec3 from, vec3 to, float begins, flo
     if (query == 0u) {
       entry = here;
       precise float least = here.distance - way;
-      if (!here.found || abs(here.distance) >= reach || least >= thickness) {
-        bool sure = !isSampled(solid) && visitsLeft > 0u && least > 0.0;
-        known = Clearance(to, sure ? (here.found || outside ? least : -least) : 0.0);
+      if (!here.found || least >= thickness) {
         return none;
       }
       entered = here.distance < 0.0;
-      precise float farthest = abs(here.distance) + way + kReachSlack;
-      bound = isSampled(solid) ? reach : min(reach, farthest);
     } else if (query == 1u) {
       end = here;
       precise float both = entry.distance + end.distance;
@@ -143,8 +98,6 @@ SolidContact touchSolid(SolidRecord solid, vec3 from, vec3 to, float begins, flo
     return leaveAt(entry, end, to, left, thickness);
   }
   precise float depth = thickness - end.distance;
-  bool sure = !isSampled(solid) && visitsLeft > 0u && end.found && depth <= 0.0;
-  known = Clearance(to, sure ? end.distance : 0.0);
   return SolidContact(Contact(end.normal, end.found ? depth : 0.0), end.motion);
 }
 

@@ -9,7 +9,6 @@
 
 #include "server/model/cloth_skin.h"
 #include "server/reference/solid.h"
-#include "tests/simulation/intersections.h"
 
 namespace clothstream::tests {
 namespace {
@@ -54,9 +53,6 @@ void Walk::measurePositions(const simulation::TickInputs& inputs) {
     }
     first += places.size();
   }
-  const auto collides = [](const model::Cloth& cloth) { return cloth.selfCollision.has_value(); };
-  if (std::ranges::all_of(scene_.cloths, collides))
-    raise(wear_.intersections, wear_.intersectionsTick, intersections(scene_, positions), ticks_);
 }
 
 double Walk::nearestExact() {
@@ -82,10 +78,9 @@ double Walk::nearestExact() {
 std::string Walk::text() const {
   return fmt::format(
       "deepest {:.2f} mm in tick {}, p99 strain {:.2f} % in tick {}, {:.2f} % beyond the largest distance in "
-      "tick {}, "
-      "exact nodes {:.4f} mm astray, {} intersections in tick {}",
+      "tick {}, exact nodes {:.4f} mm astray",
       1e3 * wear_.depth, wear_.depthTick, 1e2 * wear_.strain, wear_.strainTick, 1e2 * wear_.excess,
-      wear_.excessTick, 1e3 * wear_.astray, wear_.intersections, wear_.intersectionsTick);
+      wear_.excessTick, 1e3 * wear_.astray);
 }
 
 }  // namespace clothstream::tests

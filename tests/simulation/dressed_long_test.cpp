@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The dress of the built-in figure stays on it, and outside of it, for ten minutes. Takes about 8 minutes on
+// The dress of the built-in figure stays on it, and outside of it, for ten minutes. Takes about 20 minutes on
 // two cores of lavapipe.
 #include <iostream>
 

@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 using model::SolverKind;
 using simulation::NodeState;
 
-class Gas : public GpuTest {};
+class GasOnDevice : public GpuTest {};
 
 constexpr float kRadius = 0.3f;
 constexpr float kStiffness = 200;  // N/m, of a balloon
@@ -75,7 +75,7 @@ double balancingPressure(const model::Cloth& cloth, const NodeState& state) {
 // its place, and in the sums of 64 lanes, by kRounding of the largest sum for each of n / 64 + 6 additions
 // and ten operations of a term. Of the root, the rounding is 2e-6. The pressure then errs by this over 1 +
 // response, and the velocity by the impulse of that.
-TEST_F(Gas, MovesNodesAsTheReference) {
+TEST_F(GasOnDevice, MovesNodesAsTheReference) {
   for (const float pressure : {-30'000.0f, 500.0f, 200'000.0f}) {
     model::Cloth cloth = balloon(pressure);
     model::Scene scene = weightless({cloth}, 1);
@@ -121,7 +121,7 @@ TEST_F(Gas, MovesNodesAsTheReference) {
 }
 
 // Also while it grows, and with other stages after the gas.
-TEST_F(Gas, GrowsAsInTheReference) {
+TEST_F(GasOnDevice, GrowsAsInTheReference) {
   for (const SolverKind kind : {SolverKind::massSpring, SolverKind::acad, SolverKind::implicitEuler}) {
     model::Scene scene = weightless({balloon(3000, kind)});
     scene.cloths[0].solver.tolerance = kSolveTolerance;
@@ -143,7 +143,7 @@ TEST_F(Gas, GrowsAsInTheReference) {
 // At rest the pressure that balances the springs is that of the law, whatever the substep and the solver:
 // the law holds at the true volume, not at one without the solver's corrections. The volume is rounded to
 // 1e-6, which is 0.1 Pa, and residual motion adds less than 1e-3 of the pressure.
-TEST_F(Gas, KeepsItsLawAtRest) {
+TEST_F(GasOnDevice, KeepsItsLawAtRest) {
   struct Case {
     SolverKind kind;
     std::uint32_t substeps;
@@ -169,7 +169,7 @@ TEST_F(Gas, KeepsItsLawAtRest) {
 
 // The impulses of a closed surface add up to zero. Each is rounded by kRounding of a velocity below 4 m/s and
 // of its gradient, which is gathered from six triangles.
-TEST_F(Gas, MakesNoMomentum) {
+TEST_F(GasOnDevice, MakesNoMomentum) {
   model::Cloth cloth = balloon(100'000);
   cloth.structural = {};
   cloth.damping = 0;
@@ -196,7 +196,7 @@ TEST_F(Gas, MakesNoMomentum) {
 }
 
 // At the bound of its springs without gas, whatever the pressure; and with one substep for implicit Euler.
-TEST_F(Gas, NeedsNoMoreSubstepsThanItsSprings) {
+TEST_F(GasOnDevice, NeedsNoMoreSubstepsThanItsSprings) {
   for (const float pressure : {-50'000.0f, 10'000.0f, 1'000'000.0f}) {
     model::Cloth cloth = balloon(pressure);
     cloth.mass = 0.002f;
@@ -221,7 +221,7 @@ TEST_F(Gas, NeedsNoMoreSubstepsThanItsSprings) {
   }
 }
 
-TEST_F(Gas, GivesTheSameBitsForEveryPartitionOfWork) {
+TEST_F(GasOnDevice, GivesTheSameBitsForEveryPartitionOfWork) {
   const model::Scene scene = weightless({balloon(3000), balloon(5000, SolverKind::xpbd, 4), balloon(0)}, 40);
   const simulation::SimulationOptions ways[] = {
       {.rowsPerInvocation = 1, .workgroupSize = 32}, {.workgroupSize = 64}, {.workgroupSize = 128}};
@@ -230,7 +230,7 @@ TEST_F(Gas, GivesTheSameBitsForEveryPartitionOfWork) {
 }
 
 // The forecast of the last substep belongs to the state.
-TEST_F(Gas, ContinuesFromASnapshotWithTheSameBits) {
+TEST_F(GasOnDevice, ContinuesFromASnapshotWithTheSameBits) {
   const model::Scene scene = weightless({balloon(0), balloon(3000, SolverKind::implicitEuler)}, 4);
   Running running(scene);
   for (int tick = 0; tick < 3; ++tick) running.tick(inputsOf(scene));
@@ -258,7 +258,7 @@ TEST_F(Gas, ContinuesFromASnapshotWithTheSameBits) {
   EXPECT_EQ(running.tick(inputsOf(scene)).stateHash, last);
 }
 
-TEST_F(Gas, ComesAndGoesWhileItRuns) {
+TEST_F(GasOnDevice, ComesAndGoesWhileItRuns) {
   for (const SolverKind kind : {SolverKind::massSpring, SolverKind::xpbd}) {
     const model::Scene scene = weightless({balloon(0, kind)});
     model::Scene blown = scene;
@@ -273,7 +273,7 @@ TEST_F(Gas, ComesAndGoesWhileItRuns) {
   }
 }
 
-TEST_F(Gas, CostsNothingWithoutPressure) {
+TEST_F(GasOnDevice, CostsNothingWithoutPressure) {
   const model::Scene closed = weightless({balloon(0)}, 10);
   model::Scene open = closed;
   model::MeshShape shape = model::icosphere(3, kRadius);
@@ -289,7 +289,7 @@ TEST_F(Gas, CostsNothingWithoutPressure) {
 }
 
 // Gas presses the nodes on the floor as well, and collisions hold them.
-TEST_F(Gas, StaysOutsideColliders) {
+TEST_F(GasOnDevice, StaysOutsideColliders) {
   model::Cloth cloth = balloon(3000);
   cloth.thickness = 0.01f;
   cloth.friction = 0.5f;

@@ -7,8 +7,6 @@
 #include "kernels/sample_distances.h"
 #include "server/model/distance_grid.h"
 #include "server/model/price.h"
-#include "server/simulation/scene_tables.h"
-#include "server/simulation/texel.h"
 
 namespace clothstream::simulation {
 
@@ -30,14 +28,13 @@ SolidStage::SolidStage(const vulkan::Device& device, const SolidTables& tables,
       tileCount_(static_cast<std::uint32_t>(nodeTiles(cloths, workgroupSize).size())),
       solids_(device, tables.texels),
       tiles_(device, nodeTiles(cloths, workgroupSize)),
-      clearances_(device, vulkan::BufferPurpose::state, clothOffsets(cloths).back() * kTexelBytes),
       collide_(bindStates(device, {device, kernels::collide_solids, workgroupSize, tables.specialisation()},
                           [&](std::size_t from) {
                             const std::size_t to = 1 - from;
-                            return BufferList{
-                                &state.cloths,          &tiles_.texels(),    &solids_.texels(),
-                                state.positions[from],  state.positions[to], state.velocities[to],
-                                &state.contactImpulses, &state.colliders,    &clearances_};
+                            return BufferList{&state.cloths,          &tiles_.texels(),
+                                              &solids_.texels(),      state.positions[from],
+                                              state.positions[to],    state.velocities[to],
+                                              &state.contactImpulses, &state.colliders};
                           })) {
   for (std::size_t i = 0; i < tables.solids.size(); ++i) {
     const model::ClosedMesh& mesh = *tables.solids[i];

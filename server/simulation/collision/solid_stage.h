@@ -39,7 +39,6 @@ class SolidStage final : public Stage {
   std::uint64_t workOfSolid_ = 0;  // of the costliest mesh, for each node, in node-steps
   std::uint64_t mostOfSolid_ = 0;  // that its search may take
   DeviceTable solids_, tiles_;
-  vulkan::Buffer clearances_;  // of each node from the first mesh
   StateBindings collide_;
   // A mesh whose distances are sampled.
   struct Sampled {
