@@ -23,6 +23,8 @@ std::string welcomeWith(const ScriptedServer& server, v1::SurfacePolicy policy,
   message.ParseFromString(server.welcome());
   message.mutable_welcome()->set_role(role);
   message.mutable_welcome()->set_resumed(resumed);
+  message.mutable_welcome()->set_resume_token("0123456789abcdef");
+  message.mutable_welcome()->set_hold_ms(60'000);
   if (policy != v1::SURFACE_POLICY_UNSPECIFIED)
     message.mutable_welcome()->mutable_surfaces()->set_policy(policy);
   return message.SerializeAsString();

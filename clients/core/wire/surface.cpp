@@ -85,11 +85,13 @@ void writeSurfaceRemoval(std::string& out, std::uint32_t id) {
 
 void writeKeptSurfaces(std::string& out, std::span<const OwnSurface> surfaces) {
   writeSurface(out, 0, [&](SurfaceWriter& update) {
-    SurfaceWriter keep(update, field::SurfaceUpdate::kKeep.number);
     std::vector<std::uint32_t> ids;
     for (std::size_t i = 0; i < std::min(surfaces.size(), kMaxKeptSurfaces); ++i)
       ids.push_back(surfaces[i].id);
-    if (!ids.empty()) keep.add_packed_uint32(field::KeptSurfaces::kIds.number, ids.begin(), ids.end());
+    // A writer of a message takes it back if nothing is in it.
+    if (ids.empty()) return update.add_message(field::SurfaceUpdate::kKeep.number, std::string());
+    SurfaceWriter keep(update, field::SurfaceUpdate::kKeep.number);
+    keep.add_packed_uint32(field::KeptSurfaces::kIds.number, ids.begin(), ids.end());
   });
 }
 

@@ -204,7 +204,9 @@ TEST_F(SharingTest, HandsActWithoutTheJointsThatHaveNoRoom) {
   const auto move = [&](std::vector<model::ParticipantCollider> colliders) {
     model::ParticipantPoses poses{.colliders = std::move(colliders)};
     poses.joints = {{.collider = 0, .joints = {model::Pose{}}}};
-    const auto posted = newest.post(*member.mailbox, {}, std::move(poses), {}, now);
+    v1::ColliderPoses message;
+    message.add_joints()->set_collider("avatar");
+    const auto posted = newest.post(*member.mailbox, message, std::move(poses), {}, now);
     inbox.drain(inputs);
     return posted ? std::string() : posted.error().text;
   };

@@ -97,7 +97,7 @@ class IdentityTest : public tests::ServerTest {
   }
   // Every message that needs an identity.
   static std::vector<v1::ClientMessage> demands() {
-    std::vector<v1::ClientMessage> all(21);
+    std::vector<v1::ClientMessage> all(22);
     all[0].mutable_hello()->set_protocol_version(1);
     all[1].mutable_list_scenes();
     all[2].mutable_get_scene();
@@ -119,6 +119,7 @@ class IdentityTest : public tests::ServerTest {
     all[18].mutable_datagram_offer();
     all[19].mutable_surface()->set_remove(true);
     all[20].mutable_wear_body()->set_collider("x");
+    all[21].mutable_get_surface_part()->set_id(1);
     return all;
   }
 

@@ -190,7 +190,7 @@ TEST_F(SurfacesTest, AreSentToEveryoneIfThatIsThePolicy) {
   viewer.join();
   EXPECT_EQ(owner.welcome().surfaces().policy(), v1::SURFACE_POLICY_EVERYONE);
   // More triangles than one part has.
-  const model::Triangles mesh = model::flat(50, 50);
+  const model::Triangles mesh = model::flat(5, 5, 50);
   sendAll(owner, partsOf(3, mesh, 2000, -3));
   const v1::RoomSurfaces list = viewer.readUntil(Body::kRoomSurfaces).room_surfaces();
   ASSERT_EQ(list.surfaces_size(), 1);
@@ -206,7 +206,7 @@ TEST_F(SurfacesTest, AreSentToEveryoneIfThatIsThePolicy) {
 
   // A client that joins later has them at once. A new pose and a new mesh are announced.
   TestPeer late(server());
-  late.join();
+  late.hello("");
   const std::uint64_t revision = surface.revision();
   EXPECT_EQ(late.readUntil(Body::kRoomSurfaces).room_surfaces().surfaces(0).revision(), revision);
   v1::ClientMessage move;
