@@ -200,6 +200,7 @@ function refuseDetection() {
 test("a headset that refuses the shape of the room is no error", () =>
   withHeadset({ prepare: refuseDetection }, async (page) => {
     await enter(page, "ar", "send");
+    await page.evaluate(() => window.clothstream.headset.press("Room"));
     await untilPanelText(page, /Your headset gives no shape of the room/);
     assert.deepEqual(await page.evaluate(() => window.clothstream.headset.room), { detects: false, shares: false, detected: 0, sent: 0 });
     await untilFrames(page, 5);
