@@ -96,7 +96,8 @@ function look() {
   return { tracked: hand?.joints.slice(0, 3), wrist, elbow, head };
 }
 
-// Largest distance of a node of the tunic from its vertex of the drawn body, m.
+// Largest distance of a node of the tunic from the nearest vertex of the drawn body below the tunic, or of such a vertex
+// from the nearest node, m. Nodes of a stream are in another order than those of the scene's file.
 async function farthestFromBody(page) {
   const { positions, body, place, turn } = await page.evaluate(() => {
     const { positions, drawnColliderVertices, colliders } = window.clothstream;
@@ -104,13 +105,14 @@ async function farthestFromBody(page) {
     return { positions: [...positions], body: [...drawnColliderVertices[0]], place: position, turn: orientation };
   });
   const [qx, qy, qz, w] = [-turn[0], -turn[1], -turn[2], turn[3]]; // from the scene to the collider
-  const away = bodyOf.map((vertex, node) => {
+  const nodes = Array.from({ length: positions.length / 3 }, (_, node) => {
     const [px, py, pz] = [0, 1, 2].map((axis) => positions[3 * node + axis] - place[axis]);
     const [tx, ty, tz] = [2 * (qy * pz - qz * py), 2 * (qz * px - qx * pz), 2 * (qx * py - qy * px)];
-    const there = [px + w * tx + qy * tz - qz * ty, py + w * ty + qz * tx - qx * tz, pz + w * tz + qx * ty - qy * tx];
-    return distance(there, body.slice(3 * vertex, 3 * vertex + 3));
+    return [px + w * tx + qy * tz - qz * ty, py + w * ty + qz * tx - qx * tz, pz + w * tz + qx * ty - qy * tx];
   });
-  return Math.max(...away);
+  const vertices = bodyOf.map((vertex) => body.slice(3 * vertex, 3 * vertex + 3));
+  const away = (from, to) => from.map((point) => Math.min(...to.map((other) => distance(point, other))));
+  return Math.max(...away(nodes, vertices), ...away(vertices, nodes));
 }
 
 // A node is kBeside from its vertex of the body when it is at its skinned place, which it leaves by at most kLoose and 1 %
