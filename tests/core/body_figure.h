@@ -18,7 +18,7 @@ struct FigureJoint {
   float x = 0, y = 0, z = 0;  // at rest, m
 };
 
-// Joints of the figure of the scenes `dress` and `gown`: it looks along -Z, and its right side is at +X.
+// Joints of the figure of the scene `dress`: it looks along -Z, and its right side is at +X.
 inline std::vector<FigureJoint> figureJoints() {
   std::vector<FigureJoint> joints{{"hips", -1, 0, 0.96f, 0.01f},
                                   {"spine", 0, 0, 1.08f, 0},

@@ -23,7 +23,7 @@ TEST_F(Dressed, ADressStaysOnTheFigureForTwoSteps) {
   EXPECT_LE(walk.wear().depth, 0.002) << walk.text();
   EXPECT_LE(walk.wear().strain, 0.05) << walk.text();
   EXPECT_LE(walk.wear().excess, 0.01) << walk.text();
-  // A node gets the velocity to its place once a tick; the rounding of ten substeps at 1.5 m is 1e-6 m.
+  // A node gets the velocity to its place once a tick; the rounding of a few substeps at 1.5 m is 1e-6 m.
   EXPECT_LE(walk.wear().astray, 1e-5) << walk.text();
 }
 

@@ -15,7 +15,7 @@
 
 namespace clothstream::client::body {
 
-// What is known of a person, in the scene: metres, y upwards. Places of body tracking are optional.
+// Known parts of a person, in the scene: metres, y upwards. Places of body tracking are optional.
 struct Tracked {
   Frame head{};  // between the eyes; looks along -Z
   // Wrists; the fingers point along -Z, the back of the hand to +Y.

@@ -19,7 +19,7 @@ inline constexpr std::array kSides{Side::left, Side::right};
 
 enum class BoneKind : std::uint8_t { hips, head, upperArm, forearm, hand, thigh, shin, foot };
 
-// What the name of a joint says. A bone of the middle has no side.
+// Bone and side that the name of a joint says. A bone of the middle has no side.
 struct BoneName {
   BoneKind kind;
   std::optional<Side> side;

@@ -22,7 +22,7 @@ struct Skin {
   std::vector<std::uint8_t> joints;  // kVertexJoints for each vertex
   std::vector<float> weights;        // likewise
   std::vector<float> rest;           // kJointNumbers for each joint, at rest
-  // Of each joint: name, and index of the parent plus 1 (0: the frame of the collider; a parent comes before
+  // Name of each joint, and index of the parent plus 1 (0: the frame of the collider; a parent comes before
   // its children). Both are empty if the server does not send them.
   std::vector<std::string> names;
   std::vector<std::uint32_t> parents;
