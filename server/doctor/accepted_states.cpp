@@ -10,7 +10,7 @@ constexpr AcceptedState kStates[] = {
     {"balloon", 0x08290ba97a7b524au},
     {"curtain", 0x207b382b6d173870u},
     {"cushion", 0x5704e0d35e06026bu},
-    {"dress", 0x5c75e0f965531c95u},
+    {"dress", 0xaa70c87c5aaa5043u},
     {"figure_07", 0x864e4a384e8321c7u},
     {"figure_09", 0x944757b9bb8a4642u},
     {"figure_10", 0x75795af652c671d5u},

@@ -21,7 +21,7 @@ TIGHT = 0.93  # m, height above which the dress is tight
 SKIRT = figure.Profile([(0.45, 0.375, 0.350, 0.018), (0.80, 0.260, 0.225, 0.018), (0.88, 0.225, 0.180, 0.018),
                         (0.93, 0.202, 0.148, 0.016), (0.97, 0.184, 0.126, 0.012), (1.01, 0.160, 0.106, 0.008),
                         (1.04, 0.132, 0.088, 0.004)])
-HEM, LENGTH = 0.52, 0.0295  # m, height of the hem, and sides of the triangles
+HEM, LENGTH = 0.52, 0.0325  # m, height of the hem, and sides of the triangles
 
 
 class Body:
@@ -126,7 +126,7 @@ def write(name, description, body, cloths, settings):
 def main():
     body = Body(0.042)
     settings = {"material": "cotton", "thickness": 0.006, "friction": 0.3, "damping": 0.5, "tethers": {},
-                "solver": {"xpbd": {"iterations": 6}}}
+                "solver": {"xpbd": {"iterations": 5}}}
     write("dress", "A figure in a dress walks in a circle. The bodice follows its joints, the skirt swings.", body,
           [dress(settings)], {"substeps": 4})
 

@@ -111,7 +111,8 @@ const StateBindings& XpbdStage::meshes(const Variant& variant, bool whole) {
                     {device_,
                      kernels::correct_meshes,
                      whole ? cut_.wholeWorkgroup : cut_.partWorkgroup,
-                     {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, whole ? 1u : 0u}},
+                     {variant.damped ? 1u : 0u, tables_.iterated ? 1u : 0u, whole ? 1u : 0u,
+                      device_.hasGpuKernels() ? 1u : 0u}},
                     [&](std::size_t from) {
                       const Buffer* to = state_.positions[1 - from];
                       return BufferList{&state_.cloths, &tiles_.texels(),   state_.positions[from], to, to,
