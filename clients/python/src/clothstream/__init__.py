@@ -18,8 +18,8 @@ from .recording import (Faults, Info, Message, Pose, Recorded, RecordedCollider,
 from .simulation import Simulation, SimulationFailed, simulate
 from .stream import ConnectionFailed, RequestRefused, Stream, join
 from .types import (Cloth, ClothReport, ClothSettings, Collider, ContactEvent, DatagramStatistics, Environment, Event, Grab, GrabEvent,
-                    OwnCollider, OwnWind, Participant, Presence, Role, SceneSummary, Shape, Solver, Statistics, Surface, SurfacePolicy,
-                    WindKind)
+                    OwnCollider, OwnWind, Participant, Presence, Role, RoomSurface, SceneSummary, Shape, Solver, Statistics, Surface,
+                    SurfacePolicy, TrackedBody, WindKind)
 
 __version__: str = _text(_lib.clothstream_version())
 
@@ -28,6 +28,6 @@ __all__ = [
     "Environment", "Error",
     "Event", "Faults", "Frame", "Grab", "GrabEvent", "Info", "Message", "OwnCollider", "OwnWind", "Participant", "Pose", "Presence", "Recorded",
     "RecordedCollider", "RecordedFrame", "RecordedGrab", "RecordedTick", "Recording", "RecordingError", "RequestRefused", "Role",
-    "SceneSummary", "Shape", "Simulation", "SimulationFailed", "Solver", "Statistics", "Stream", "Surface", "SurfacePolicy", "WindKind", "join", "open_recording",
-    "simulate",
+    "RoomSurface", "SceneSummary", "Shape", "Simulation", "SimulationFailed", "Solver", "Statistics", "Stream", "Surface", "SurfacePolicy", "TrackedBody", "WindKind", "join",
+    "open_recording", "simulate",
 ]

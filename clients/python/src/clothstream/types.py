@@ -7,11 +7,15 @@ import dataclasses
 import enum
 from typing import Sequence
 
+import numpy as np
+
 from . import _bindings as b
 
 Vec3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 """x, y, z, w."""
+Pose = tuple[float, float, float, float, float, float, float]
+"""Position in m, and quaternion x, y, z, w."""
 Spring = tuple[float, float]
 """Stiffness in N/m and damping in N s/m."""
 
@@ -35,6 +39,7 @@ class Event(enum.IntFlag):
     TOKEN = b.CS_EVENT_TOKEN
     PAIRING_CODE = b.CS_EVENT_PAIRING_CODE
     ANSWER = b.CS_EVENT_ANSWER
+    SURFACES = b.CS_EVENT_SURFACES
 
 
 class Role(enum.IntEnum):
@@ -275,6 +280,35 @@ class Surface:
     orientation: Quaternion = (0, 0, 0, 1)
     two_sided: bool = False  # cloth can be on both sides; else it passes the surface from behind
     friction: float = 1.0  # coefficient, 0 to 10, multiplied with the cloth's
+
+
+@dataclasses.dataclass(frozen=True)
+class RoomSurface:
+    """Surface of the real room of another participant."""
+
+    id: int  # unique for its participant
+    participant_id: int
+    revision: int  # differs from that of every other mesh of the scene
+    position: Vec3  # m
+    orientation: Quaternion
+    positions: np.ndarray  # m, float32 of shape (vertices, 3), in the frame of the surface
+    triangles: np.ndarray  # uint32 of shape (triangles, 3), counter-clockwise seen from the front
+    two_sided: bool  # cloth can be on both sides
+
+
+@dataclasses.dataclass(frozen=True)
+class TrackedBody:
+    """What is known of a person, in the scene. None: not tracked. Without a head, nothing acts."""
+
+    head: Pose  # between the eyes; looks along -Z
+    left_hand: Pose | None = None  # wrists: the fingers point along -Z, and the back of the hand to +Y
+    right_hand: Pose | None = None
+    hips: Vec3 | None = None  # joints of body tracking, m
+    left_elbow: Vec3 | None = None
+    right_elbow: Vec3 | None = None
+    left_ankle: Vec3 | None = None
+    right_ankle: Vec3 | None = None
+    floor: float = 0.0  # height of the floor, m
 
 
 @dataclasses.dataclass(frozen=True)
