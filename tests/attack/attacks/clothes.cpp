@@ -125,7 +125,7 @@ std::string createHugeClothes(const Target& target) {
       region.mutable_region()->set_radius(1000);
       region.mutable_limits()->set_max_distance(0.01f);
     }
-    answer = answerOf(create(*stub, scene));
+    answer = upload(*stub, scene.SerializeAsString());
   });
   return answer;
 }
@@ -141,7 +141,7 @@ std::string createEquallyNear(const Target& target) {
     scene.set_stream_rate(10);
     scene.mutable_cloths(0)->mutable_grid()->set_width(0.002f * static_cast<float>(size));
     scene.mutable_cloths(0)->mutable_grid()->set_height(0.002f * static_cast<float>(size));
-    if (const grpc::Status status = create(*stub, scene); !status.ok()) continue;
+    if (!upload(*stub, scene.SerializeAsString()).starts_with("accepted")) continue;
     const Joined joined(*stub, scene.name());
     std::this_thread::sleep_for(target.time);
     return fmt::format("accepted with {} nodes a side; the stream {}", size,
