@@ -7,7 +7,7 @@ namespace clothstream::doctor {
 namespace {
 
 constexpr AcceptedState kStates[] = {
-    {"balloon", 0x08290ba97a7b524au},
+    {"balloon", 0xda6bbeea981c11fdu},
     {"curtain", 0x207b382b6d173870u},
     {"cushion", 0x5704e0d35e06026bu},
     {"dress", 0xaa70c87c5aaa5043u},

@@ -16,12 +16,14 @@ const kDocs = fileURLToPath(new URL("../../docs/", import.meta.url));
 const kDesktop = { width: 1280, height: 800 };
 const kMoving = { width: 560, height: 400 };
 const kSwing = 5; // s, period of the collider's motion
-const kScene = { width: 1280, height: 960 };
-// When a scene shows what it is for (s), and the part of the page where that is (pixels).
+const kScene = { width: 1120, height: 960 };
+const kMiddle = { x: 100, y: 160, width: 720, height: 600 };
+// When a scene shows what it is for (s), the part of the page where that is (pixels), and how far the mouse wheel turns
+// before, away from the scene (pixels).
 const kPictures = [
-  { scene: "dress", second: 4, part: { x: 0, y: 160, width: 600, height: 500 } },
-  { scene: "balloon", second: 1, part: { x: 0, y: 0, width: 1280, height: 960 } },
-  { scene: "cushion", second: 2, part: { x: 0, y: 0, width: 1280, height: 960 } },
+  { scene: "dress", second: 4, part: { x: 0, y: 120, width: 640, height: 560 } },
+  { scene: "balloon", second: 0.5, part: kMiddle, zoom: 600 },
+  { scene: "cushion", second: 4.5, part: kMiddle },
 ];
 const kStart = 6.25; // s, after the first swing
 const kFramesPerSecond = 12;
@@ -43,18 +45,42 @@ async function untilSecond(page, second) {
   await page.waitForFunction((end) => window.clothstream.statistics.tick / 72 > end, second);
 }
 
-async function pictureOf({ scene, second, part }) {
-  const started = await startServer(0, ["--scene", scene]);
+// Returns the file of a recording of the first seconds of a scene.
+async function recorded(scene, seconds) {
+  const own = await mkdtemp(join(folder, "recorded-"));
+  const started = await startServer(0, ["--scene", scene, "--record", own]);
   try {
-    const page = await openPage(browser, started.url, { viewport: kScene });
+    const page = await openPage(browser, started.url);
     await untilState(page, "live");
-    await page.addStyleTag({ content: "#notice, .card { display: none !important; }" });
-    await untilSecond(page, second);
-    await page.screenshot({ path: join(kDocs, "images", `${scene}.png`), clip: part });
+    await untilSecond(page, seconds);
     await page.close();
   } finally {
     await started.stop();
   }
+  const [file] = await readdir(own);
+  return join(own, file);
+}
+
+// Plays a recording slowly, because a picture takes long, and calls `use` with a page that shows nothing else.
+async function playSlowly(recording, from, viewport, use) {
+  const started = await startServer(0, ["play", recording, "--speed", String(kSlow), "--from", String(from)]);
+  try {
+    const page = await openPage(browser, started.url, { viewport });
+    await untilState(page, "live");
+    await page.addStyleTag({ content: ".card, #notice, #panel { display: none !important; }" });
+    await use(page);
+  } finally {
+    await started.stop();
+  }
+}
+
+async function pictureOf({ scene, second, part, zoom = 0 }) {
+  await playSlowly(await recorded(scene, second + 1), second, kScene, async (page) => {
+    await page.mouse.move(kMiddle.x, kMiddle.y);
+    await page.mouse.wheel(0, zoom);
+    await page.waitForFunction((time) => window.clothstream.playback.position >= time, second);
+    await page.screenshot({ path: join(kDocs, "images", `${scene}.png`), clip: part });
+  });
 }
 
 async function pictureOfPage() {
@@ -72,37 +98,16 @@ async function pictureOfPage() {
   }
 }
 
-async function recordSwing() {
-  const started = await startServer(0, ["--scene", "curtain", "--record", folder]);
-  try {
-    const page = await openPage(browser, started.url);
-    await untilState(page, "live");
-    await untilSecond(page, kStart + kSwing + 1);
-    await page.close();
-  } finally {
-    await started.stop();
-  }
-  const [recording] = (await readdir(folder)).filter((name) => name.endsWith(".mcap"));
-  return join(folder, recording);
-}
-
 async function movingPicture() {
-  const recording = await recordSwing();
-  const started = await startServer(0, ["play", recording, "--speed", String(kSlow), "--from", String(kStart)]);
   const frames = [];
-  try {
-    const page = await openPage(browser, started.url, { viewport: kMoving });
-    await untilState(page, "live");
-    await page.addStyleTag({ content: ".card { display: none !important; }" });
+  await playSlowly(await recorded("curtain", kStart + kSwing + 1), kStart, kMoving, async (page) => {
     for (let frame = 0; frame < kSwing * kFramesPerSecond; ++frame) {
       await page.waitForFunction((time) => window.clothstream.playback.position >= time, kStart + frame / kFramesPerSecond);
       const file = join(folder, `${String(frame).padStart(3, "0")}.png`);
       await writeFile(file, await page.screenshot());
       frames.push(file);
     }
-  } finally {
-    await started.stop();
-  }
+  });
   const options = ["-loop", "0", "-lossy", "-q", "75", "-m", "4", "-d", String(Math.round(1000 / kFramesPerSecond))];
   execFileSync("img2webp", [...options, ...frames, "-o", join(kDocs, "cloth.webp")]);
 }
