@@ -59,6 +59,20 @@ class InstanceRequest {
   VkInstanceCreateInfo info_{};
 };
 
+// Loads the functions of an instance. With validation, also logs and counts the messages of the layer. Make it right after
+// the instance, and destroy it before the instance. At most one exists at a time.
+class LoadedInstance {
+ public:
+  explicit LoadedInstance(VkInstance instance);
+  ~LoadedInstance();
+  LoadedInstance(const LoadedInstance&) = delete;
+  LoadedInstance& operator=(const LoadedInstance&) = delete;
+
+ private:
+  VkInstance instance_;
+  VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+};
+
 // Parameters of vkCreateDevice, or of xrCreateVulkanDeviceKHR: one queue of the family, and the features that the
 // renderer needs. `extensions` are added to the required ones and must outlive the request.
 class DeviceRequest {
