@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/xr/text/fonts.h"
 #include "clients/xr/text/picture.h"
 
 namespace clothstream::xr {
@@ -17,7 +18,6 @@ struct Ink {
   std::uint8_t red = 255, green = 255, blue = 255, alpha = 255;
 };
 
-enum class Weight { kRegular, kBold };
 enum class Align { kLeft, kCentre, kRight };
 
 // Not thread-safe.
@@ -46,7 +46,6 @@ class TextPainter {
   std::shared_ptr<const Picture> label(std::string_view name, Ink border);
 
  private:
-  struct Fonts;
   std::unique_ptr<Fonts> fonts_;
 };
 
