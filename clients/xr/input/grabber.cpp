@@ -25,9 +25,9 @@ cs_grab Grabber::grab(const Limb& limb) const {
   grab.id = id_;
   grab.radius = grab.reach = grab.max_force = grab.slip_distance = kDefault;
   grab.place = &place_;
-  const Eigen::Vector3f position = byRay_ && limb.hasRay()
-                                       ? Eigen::Vector3f(limb.ray().origin + place_.distance * limb.ray().direction)
-                                       : limb.grip().apply(offset_);
+  const Eigen::Vector3f position =
+      byRay_ && limb.hasRay() ? Eigen::Vector3f(limb.ray().origin + place_.distance * limb.ray().direction)
+                              : limb.grip().apply(offset_);
   Eigen::Map<Eigen::Vector3f>(grab.position) = position;
   if (!byRay_)
     Eigen::Map<Eigen::Vector4f>(grab.orientation) = (limb.grip().orientation * back_).normalized().coeffs();

@@ -25,8 +25,8 @@ class Grabber {
   // Largest distance of cloth that a ray takes hold of, m.
   static constexpr float kRayLength = 5;
 
-  // Takes hold of the cloth within the reach of the limb, or else under its ray. `id` is new among the grabs of
-  // the client. Returns whether there is any.
+  // Takes hold of the cloth within the reach of the limb, or else under its ray. `id` is new among the grabs
+  // of the client. Returns whether there is any.
   bool take(const Limb& limb, const Touchable& cloth, std::uint32_t id);
   void release() { id_ = 0; }
 
@@ -42,7 +42,7 @@ class Grabber {
   std::uint32_t id_ = 0;  // 0: holds nothing
   bool byRay_ = false;
   cs_cloth_point place_{};
-  Eigen::Vector3f offset_ = Eigen::Vector3f::Zero();  // from the limb to the held place, in its frame
+  Eigen::Vector3f offset_ = Eigen::Vector3f::Zero();          // from the limb to the held place, in its frame
   Eigen::Quaternionf back_ = Eigen::Quaternionf::Identity();  // inverse orientation of the limb at the start
 };
 

@@ -16,16 +16,16 @@ struct Ray {
   Eigen::Vector3f direction = -Eigen::Vector3f::UnitZ();  // of length 1
 };
 
-// A controller that is held has priority over a hand, because runtimes also make joints of controllers. What is
-// lost keeps its last pose for kHoldUs; what switches does so at once.
+// A controller that is held has priority over a hand, because runtimes also make joints of controllers. What
+// is lost keeps its last pose for kHoldUs; what switches does so at once.
 class Limb {
  public:
   static constexpr std::uint64_t kHoldUs = 300'000;
 
   explicit Limb(Side side) : side_(side) {}
 
-  // Call once per frame. `toScene` leads from the room to the scene. `head` is the head in the room, or null if
-  // it is not known; a hand without a ray of the runtime points away from the shoulder below it.
+  // Call once per frame. `toScene` leads from the room to the scene. `head` is the head in the room, or null
+  // if it is not known; a hand without a ray of the runtime points away from the shoulder below it.
   void update(const LimbSample& sample, const Pose* head, const Pose& toScene, std::uint64_t nowUs);
   // Forgets everything, for example because the session is not visible.
   void forget();
@@ -44,8 +44,8 @@ class Limb {
   // Of a hand.
   const HandJoints& joints() const { return joints_; }
 
-  // Pressed: the hand pinches, or trigger or squeeze of the controller are down. `isNew` in the frame in which
-  // the press began.
+  // Pressed: the hand pinches, or trigger or squeeze of the controller are down. `isNew` in the frame in
+  // which the press began.
   bool pressed() const { return pinch_.pressed() || trigger_.pressed() || squeeze_.pressed(); }
   bool isNew() const { return isNew_; }
   // Whether the press points at something: a pinch or a trigger, not a squeeze.

@@ -2,7 +2,7 @@
 // Where the scene of the server stands in the user's room.
 #pragma once
 
-#include "clients/xr/input/pose.h"
+#include "clients/xr/geometry/pose.h"
 
 namespace clothstream::xr {
 
@@ -16,8 +16,8 @@ class Placement {
   // Distance from the user to the front of the scene when it is placed, m.
   static constexpr float kArmLength = 0.5f;
 
-  // Puts the front of the scene before the user, on the floor of the room. `head` is in the room, whose floor is
-  // at y = 0.
+  // Puts the front of the scene before the user, on the floor of the room. `head` is in the room, whose floor
+  // is at y = 0.
   void placeBefore(const Pose& head, const SceneBounds& bounds);
 
   const Pose& toRoom() const { return toRoom_; }

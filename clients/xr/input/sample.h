@@ -6,14 +6,16 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "clients/xr/input/pose.h"
+#include "clients/xr/geometry/pose.h"
 #include "proto/hands/bones.h"
 
 namespace clothstream::xr {
 
 enum class Side : std::uint8_t { left, right };
 inline constexpr std::size_t kSides = 2;
-inline constexpr std::size_t indexOf(Side side) { return static_cast<std::size_t>(side); }
+inline constexpr std::size_t indexOf(Side side) {
+  return static_cast<std::size_t>(side);
+}
 
 struct HandJoint {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();

@@ -2,9 +2,8 @@
 // Rigid poses. Coordinates are right-handed with +Y up, in metres.
 #pragma once
 
-#include <cmath>
-
 #include <Eigen/Geometry>
+#include <cmath>
 
 namespace clothstream::xr {
 
@@ -30,8 +29,7 @@ inline Pose inverse(const Pose& pose) {
 
 // Returns whether all numbers are finite and the orientation is no zero quaternion.
 inline bool isPossible(const Pose& pose) {
-  return pose.position.allFinite() && pose.orientation.coeffs().allFinite() &&
-         pose.orientation.norm() > 0.5f;
+  return pose.position.allFinite() && pose.orientation.coeffs().allFinite() && pose.orientation.norm() > 0.5f;
 }
 
 // Turn around the vertical of the direction of -Z, counter-clockwise seen from above, in radians. 0 if the
