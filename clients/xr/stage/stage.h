@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "clients/xr/geometry/pose.h"
 #include "clients/xr/text/picture.h"
 
 namespace clothstream::xr {
@@ -21,12 +22,6 @@ using Colour = Eigen::Vector3f;
 
 // Colour of 0xRRGGBB in sRGB encoding.
 Colour fromSrgb(std::uint32_t rgb);
-
-// Pose of a rigid frame.
-struct Pose {
-  Eigen::Vector3f position = Eigen::Vector3f::Zero();
-  Eigen::Quaternionf orientation = Eigen::Quaternionf::Identity();
-};
 
 // What is seen where nothing is drawn.
 enum class Background : std::uint32_t {

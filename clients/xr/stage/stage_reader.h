@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -28,46 +29,45 @@ class StageReader {
   void read(cs_client* client, std::uint32_t events, bool drawsOwn, Stage& stage);
 
  private:
+  // A collider of the scene that is a hull or mesh.
   struct Hull {
-    std::uint32_t collider = 0;       // index
+    std::uint32_t collider = 0; // index
     std::uint32_t firstNode = 0, nodeCount = 0;
-    std::uint32_t part = 0, frame = 0;
-    bool isBody = false;
+    std::uint32_t frame = 0;    // in Stage::frames
     float shrink = 1;
+    std::optional<std::uint32_t> headPart; // part with the head, of a body that can be worn
+    std::string name;
   };
   struct Person {
     std::string name;
-    Colour colour;
-    std::shared_ptr<const Picture> picture;
-    bool wearsBody = false;
-    std::uint64_t pass = 0;
+    std::shared_ptr<const Picture> picture; // null without a name
+  };
+  struct ClothPart {
+    std::uint32_t cloth = 0;
+    std::uint32_t dye = 0;
+    bool woven = false;
   };
 
+  bool describes(const cs_client* client) const;
   void readTopology(const cs_client* client, Stage& stage);
-  void readMaterials(const cs_client* client, Stage& stage);
+  void readCloth(const cs_client* client, std::uint32_t index, Stage& stage);
+  void readHull(const cs_client* client, std::uint32_t index, Stage& stage);
+  void readBounds(const cs_client* client, Stage& stage) const;
+  void readMaterials(const cs_client* client, Stage& stage) const;
   void readPeople(const cs_client* client);
-  void readNodes(const cs_client* client, Stage& stage);
+  void readNodes(const cs_client* client, Stage& stage) const;
+  void readHulls(const cs_client* client, bool hidesOwnHead, Stage& stage) const;
   void readColliders(const cs_client* client, bool drawsOwn, Stage& stage);
+  void addLabel(const cs_collider& head, Stage& stage);
 
   TextPainter& painter_;
   std::vector<Hull> hulls_;
-  std::vector<std::uint32_t> clothOfPart_; // cloth of each part of a cloth
-  std::vector<std::uint32_t> dyes_;        // number of each part's dye
-  std::vector<bool> woven_;
+  std::vector<ClothPart> parts_; // the first parts of the stage
   std::unordered_map<std::uint64_t, Person> people_;
+  // Of the description that was read.
   const std::uint32_t* triangles_ = nullptr;
   std::uint32_t indexCount_ = 0, vertexCount_ = 0;
-  std::uint64_t pass_ = 0;
+  std::uint64_t topology_ = 0;
 };
-
-// Adds a tracked hand to a list: a tapered capsule for each bone. Each joint is {x, y, z, radius}, in the order of
-// OpenXR (26 joints).
-void addHand(const float* joints, const Colour& colour, bool hidesOnly, std::vector<Solid>& out);
-
-// Adds a thin glowing ray.
-void addRay(const Eigen::Vector3f& from, const Eigen::Vector3f& to, const Colour& colour, std::vector<Solid>& out);
-
-// Colour of a participant, the same for everyone.
-Colour colourOf(std::uint64_t participant);
 
 }  // namespace clothstream::xr
