@@ -23,7 +23,8 @@ vec3 bent(vec3 n, vec2 relief, vec2 uv) {
   vec3 b = q1 * tx.y + q0 * ty.y;
   float longest = max(dot(t, t), dot(b, b));
   if (longest == 0.0) return n;
-  float side = gl_FrontFacing ? 1.0 : -1.0;
+  // Rows of the picture go down, so derivatives along them turn both tangents around.
+  float side = gl_FrontFacing ? -1.0 : 1.0;
   return normalize(n + side * inversesqrt(longest) * (relief.x * t + relief.y * b));
 }
 

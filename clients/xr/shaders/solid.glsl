@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vertices of spheres, capsules, boxes and planes. An index of a capsule has the latitude in its upper and the longitude
-// in its lower 16 bits; both count to the number in the record's kind.
+// Vertices of spheres, capsules, boxes and planes, from their index. Those of a capsule are in rows of equal latitude.
 layout(set = 0, binding = kSolidsBinding, std430) readonly buffer Solids { SolidRecord solids[]; };
 
 const uint kBox = 1;
@@ -14,8 +13,8 @@ struct SolidVertex {
 };
 
 SolidVertex capsuleVertex(vec4 shape, uint index, uint rows, uint columns) {
-  uint row = index >> 16;
-  float longitude = 6.28318531 * float(index & 0xFFFFu) / float(columns);
+  uint row = index / columns;
+  float longitude = 6.28318531 * float(index % columns) / float(columns);
   // Half of the rows are on each ball. The cone between them touches both at the same latitude.
   bool isUpper = row > rows;
   float rise = clamp((shape.y - shape.x) / max(shape.z, 1e-6), -0.99, 0.99);
@@ -53,7 +52,7 @@ SolidVertex planeVertex(vec4 shape, uint index) {
   return vertex;
 }
 
-// The kind of a capsule has the number of its rows in bits 8 to 15 and that of its columns in bits 16 and above.
+// The kind of a capsule has the number of rows of each of its balls in bits 8 to 15 and that of its columns in bits 16 and above.
 SolidVertex vertexOf(SolidRecord solid, uint index) {
   uint kind = floatBitsToUint(solid.shape.w);
   SolidVertex vertex;
