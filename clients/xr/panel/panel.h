@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 
+#include "clients/xr/panel/panel_drawing.h"
 #include "clients/xr/stage/stage.h"
 #include "clients/xr/text/painter.h"
 
@@ -69,18 +70,21 @@ struct PanelHit {
 
 enum class PanelTab : std::uint32_t { kScenes = 0, kPeople = 1, kQuality = 2, kFigures = 3 };
 
+// Has a thread that draws.
 class Panel {
  public:
-  // `painter` must outlive the panel.
+  // `painter` measures texts, and must outlive the panel.
   explicit Panel(TextPainter& painter);
 
-  // Shows the facts. Lays out and draws only what has changed.
+  // Shows the facts. Lays out and draws only if they have changed.
   void show(const PanelFacts& facts);
-  // Size of what is drawn, m. The height depends on the content; the picture is as large.
-  Eigen::Vector2f size() const;
-  const Picture& picture() const { return picture_; }
-  // The quad for a stage, with its upper edge's middle at the pose.
-  PanelQuad quad(const Pose& pose) const;
+  // The quad for a stage, with the middle of its upper edge at the pose. Its picture is the newest that is drawn, and
+  // valid until the next call.
+  PanelQuad quad(const Pose& pose);
+  // Waits until the picture of quad() has everything.
+  void finish() { drawing_.finish(); }
+  // Height of what is drawn, m. It depends on the facts; the quad is as high as the panel can be.
+  float height() const { return drawn_.height; }
 
   // Where a ray meets the front of the panel, whose upper edge's middle is at `pose`. The direction has length 1.
   std::optional<PanelHit> hit(const Pose& pose, const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
@@ -93,51 +97,45 @@ class Panel {
   // A finger tip at `tip`. Going through a button from the front acts at once. Returns what it asks for.
   std::optional<PanelAction> poke(std::size_t pointer, const Pose& pose, const Eigen::Vector3f& tip);
   // Whether a press of this pointer began on the panel and has not ended; the program does not grab cloth then.
-  bool isHeld(std::size_t pointer) const { return pressedAt_[pointer].has_value(); }
+  bool isHeld(std::size_t pointer) const { return presses_[pointer].has_value(); }
 
-  // For tests: the texts that are shown, and the buttons with the middle of each.
-  struct Button {
-    std::string text, detail;
-    bool isChosen = false, isEnabled = true;
-    Eigen::Vector2f place, size; // m from the upper left corner: middle, and width and height
-  };
-  const std::vector<std::string>& texts() const { return texts_; }
-  std::vector<Button> buttons() const;
+  // What is shown: lines of text, and buttons.
+  const std::vector<PanelLine>& lines() const { return drawn_.lines; }
+  const std::vector<PanelArea>& buttons() const { return drawn_.areas; }
 
  private:
-  enum class Turn { kNone, kTab, kPage };
-  struct Area {
-    Button button;
+  // What a press of a button does.
+  struct Effect {
     std::optional<PanelAction> action;
-    Turn turn = Turn::kNone;
-    std::uint32_t turnTo = 0; // tab or page
+    std::optional<PanelTab> tab;
+    std::optional<std::uint32_t> page;
+  };
+  struct Item {
+    std::string text, detail;
+    bool isChosen = false, isEnabled = true;
+    Effect effect;
   };
 
   void layOut();
-  void draw();
-  std::optional<PanelAction> press(int button);
+  void layOutTrouble(float& top);
+  void layOutTab(float& top);
+  void addText(float& top, const std::string& text, std::size_t most, bool isStrong);
+  void addButtons(float& top, const std::vector<Item>& items, float left = kPanelMargin);
+  // Buttons or lines of a list, and buttons for its other pages if it has more than `most` rows.
+  void addList(float& top, std::size_t most, const std::vector<Item>& items, bool areButtons);
   int buttonAt(const Eigen::Vector2f& place) const;
-  void addButtons(float top, float left, std::vector<Area> areas);
-  float addList(float top, std::size_t most, std::size_t count);
+  std::optional<PanelAction> press(int button);
 
   TextPainter& painter_;
+  PanelPainter drawing_;
   PanelFacts facts_;
-  bool hasFacts_ = false;
+  bool isEmpty_ = true;
   PanelTab tab_ = PanelTab::kScenes;
   std::uint32_t page_ = 0;
-  std::vector<Area> areas_;
-  struct Line {
-    float top = 0;
-    std::string text, detail;
-    bool isStrong = false;
-  };
-  std::vector<Line> lines_;
-  std::vector<std::string> texts_;
-  float height_ = 0; // m
-  Picture picture_;
-  std::array<int, kPointers> hovered_{-1, -1};
+  PanelDrawing drawn_;
+  std::vector<Effect> effects_; // of each button
   std::array<bool, kPointers> wasPressed_{};
-  std::array<std::optional<int>, kPointers> pressedAt_{};
+  std::array<std::optional<int>, kPointers> presses_{}; // button on which a press began, or -1
   std::array<std::optional<bool>, kPointers> tipWasInFront_{};
 };
 

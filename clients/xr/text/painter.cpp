@@ -49,7 +49,8 @@ float distanceFrom(float x, float y, float halfWidth, float halfHeight, float ra
 
 }  // namespace
 
-TextPainter::TextPainter(const std::string& fontFile) : fonts_(std::make_unique<Fonts>(fontFile)) {}
+TextPainter::TextPainter(const std::string& fontFile)
+    : fontFile_(fontFile), fonts_(std::make_unique<Fonts>(fontFile)) {}
 TextPainter::~TextPainter() = default;
 
 float TextPainter::width(std::string_view utf8, float pixels, Weight weight) {

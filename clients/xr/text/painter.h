@@ -30,6 +30,7 @@ class TextPainter {
   TextPainter(const TextPainter&) = delete;
   TextPainter& operator=(const TextPainter&) = delete;
 
+  const std::string& fontFile() const { return fontFile_; }
   // Width of a text in pixels. `pixels` is the size of the font.
   float width(std::string_view utf8, float pixels, Weight weight = Weight::kRegular);
   // Lines of at most `most` pixels. A word that is wider stands alone, and is cut when it is drawn. At most `lines`
@@ -46,6 +47,7 @@ class TextPainter {
   std::shared_ptr<const Picture> label(std::string_view name, Ink border);
 
  private:
+  std::string fontFile_;
   std::unique_ptr<Fonts> fonts_;
 };
 
