@@ -9,7 +9,6 @@
 
 #include "clients/xr/openxr/actions.h"
 #include "clients/xr/openxr/eye_pictures.h"
-#include "clients/xr/openxr/frame_commands.h"
 #include "clients/xr/openxr/graphics.h"
 #include "clients/xr/openxr/hand_trackers.h"
 #include "clients/xr/openxr/instance.h"
@@ -18,6 +17,7 @@
 #include "clients/xr/openxr/room_space.h"
 #include "clients/xr/openxr/session.h"
 #include "clients/xr/openxr/swapchain.h"
+#include "clients/xr/render/frame_commands.h"
 #include "clients/xr/render/renderer.h"
 #include "clients/xr/timing/display_clock.h"
 #include "clients/xr/visit/visit.h"

@@ -45,10 +45,4 @@ XrResult check(XrResult result, const char* call) {
   return result;
 }
 
-void check(VkResult result, const char* call) {
-  if (result != VK_SUCCESS)
-    throw std::runtime_error(std::string(call) + " failed: VkResult " +
-                             std::to_string(static_cast<int>(result)));
-}
-
 }  // namespace clothstream::xr

@@ -13,6 +13,8 @@
 #include <openxr/openxr.h>
 #include <openxr/openxr_platform.h>
 
+#include "clients/xr/render/handle.h"  // check() of results of Vulkan
+
 namespace clothstream::xr {
 
 // The headers of Debian 12 are those of OpenXR 1.0.20, which lack these.
@@ -40,8 +42,6 @@ const char* nameOf(XrSessionState state);
 // Throws an XrError that names the call unless it succeeded. Returns the result, which may be a success other
 // than XR_SUCCESS.
 XrResult check(XrResult result, const char* call);
-// The same for a result of Vulkan; throws a std::runtime_error.
-void check(VkResult result, const char* call);
 
 // A structure of OpenXR whose other members are 0.
 template <typename Structure>

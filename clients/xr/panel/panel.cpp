@@ -75,8 +75,8 @@ void Panel::layOutTrouble(float& top) {
   addText(top, facts_.advice, 6, false);
   std::vector<Item> buttons;
   if (facts_.canRetry)
-    buttons.push_back({.text = "Try again", .detail = "", .effect = {.action = PanelAction{PanelActionKind::kRetry}}});
-  buttons.push_back({.text = "Leave", .detail = "", .effect = {.action = PanelAction{PanelActionKind::kLeave}}});
+    buttons.push_back({.text = "Try again", .effect = {.action = PanelAction{PanelActionKind::kRetry}}});
+  buttons.push_back({.text = "Leave", .effect = {.action = PanelAction{PanelActionKind::kLeave}}});
   addButtons(top, buttons);
 }
 
@@ -84,7 +84,6 @@ void Panel::layOutTab(float& top) {
   std::vector<Item> tabs;
   for (std::uint32_t i = 0; i < kTabs.size(); ++i)
     tabs.push_back({.text = kTabs[i],
-                    .detail = "",
                     .isChosen = static_cast<PanelTab>(i) == tab_,
                     .effect = {.tab = static_cast<PanelTab>(i)}});
   addButtons(top, tabs);
@@ -93,11 +92,9 @@ void Panel::layOutTab(float& top) {
     case PanelTab::kScenes: {
       const PanelActionKind pause = facts_.isPaused ? PanelActionKind::kContinue : PanelActionKind::kPause;
       addButtons(top, {{.text = "Reset",
-                        .detail = "",
                         .isEnabled = facts_.mayAct,
                         .effect = {.action = PanelAction{PanelActionKind::kReset}}},
                        {.text = facts_.isPaused ? "Continue" : "Pause",
-                        .detail = "",
                         .isEnabled = facts_.mayAct,
                         .effect = {.action = PanelAction{pause}}}});
       for (const PanelFacts::Scene& scene : facts_.scenes)
@@ -117,7 +114,6 @@ void Panel::layOutTab(float& top) {
       addText(top, "Best quality of your stream", 1, false);
       for (std::uint32_t i = 0; i < kQualities.size(); ++i)
         items.push_back({.text = kQualities[i],
-                         .detail = "",
                          .isChosen = i == facts_.quality,
                          .effect = {.action = PanelAction{PanelActionKind::kQuality, "", i}}});
       addButtons(top, items);
@@ -132,8 +128,8 @@ void Panel::layOutTab(float& top) {
   std::vector<Item> last;
   if (facts_.canRecenter)
     last.push_back(
-        {.text = "Place before me", .detail = "", .effect = {.action = PanelAction{PanelActionKind::kRecenter}}});
-  last.push_back({.text = "Leave", .detail = "", .effect = {.action = PanelAction{PanelActionKind::kLeave}}});
+        {.text = "Place before me", .effect = {.action = PanelAction{PanelActionKind::kRecenter}}});
+  last.push_back({.text = "Leave", .effect = {.action = PanelAction{PanelActionKind::kLeave}}});
   addButtons(top, last);
   // Last, so that a long text moves no button.
   const float rest = (kPanelHeight - kPanelMargin - top - kPanelRow) / (kPanelRow * kLineHeight);
@@ -183,8 +179,8 @@ void Panel::addList(float& top, std::size_t most, const std::vector<Item>& items
   if (!hasPages) return;
   drawn_.lines.push_back({top, fmt::format("{} of {}", page_ + 1, pages), "", false});
   addButtons(top,
-             {{.text = "Back", .detail = "", .isEnabled = page_ > 0, .effect = {.page = page_ - 1}},
-              {.text = "More", .detail = "", .isEnabled = page_ + 1 < pages, .effect = {.page = page_ + 1}}},
+             {{.text = "Back", .isEnabled = page_ > 0, .effect = {.page = page_ - 1}},
+              {.text = "More", .isEnabled = page_ + 1 < pages, .effect = {.page = page_ + 1}}},
              kPanelMargin + kLabelPart * kInner);
 }
 

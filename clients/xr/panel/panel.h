@@ -57,7 +57,7 @@ enum class PanelActionKind { kJoinScene, kReset, kPause, kContinue, kQuality, kR
 // What a press asks the program to do.
 struct PanelAction {
   PanelActionKind kind = PanelActionKind::kReset;
-  std::string scene;         // kJoinScene
+  std::string scene{};       // kJoinScene
   std::uint32_t quality = 0; // kQuality
   bool operator==(const PanelAction&) const = default;
 };
@@ -106,14 +106,14 @@ class Panel {
  private:
   // What a press of a button does.
   struct Effect {
-    std::optional<PanelAction> action;
-    std::optional<PanelTab> tab;
-    std::optional<std::uint32_t> page;
+    std::optional<PanelAction> action{};
+    std::optional<PanelTab> tab{};
+    std::optional<std::uint32_t> page{};
   };
   struct Item {
-    std::string text, detail;
+    std::string text, detail{};
     bool isChosen = false, isEnabled = true;
-    Effect effect;
+    Effect effect{};
   };
 
   void layOut();

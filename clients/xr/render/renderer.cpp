@@ -41,6 +41,7 @@ struct Renderer::Parts {
         data(graphics, pipelines, passes, textures) {
     setLight(frame);
     frame.encodes = encodesByItself(options.colour) ? 0 : 1;
+    data.upload(Stage{}); // so that a stage without cloths needs no upload
   }
 
   void gatherNormals(VkCommandBuffer commands, const Stage& stage) const;

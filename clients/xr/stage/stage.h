@@ -47,7 +47,7 @@ struct Surface {
 // A range of triangles with one surface, of a cloth or of a collider that is a hull.
 struct MeshPart {
   std::uint32_t firstIndex = 0, indexCount = 0; // in Stage::indices
-  Surface surface;
+  Surface surface{};
   bool visible = true;     // else it only casts a shadow
   std::uint32_t frame = 0; // index in Stage::frames
 };

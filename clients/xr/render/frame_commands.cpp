@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "clients/xr/openxr/frame_commands.h"
+#include "clients/xr/render/frame_commands.h"
 
 #include <cstdint>
 
-#include "clients/xr/openxr/xr.h"
+#include "clients/xr/render/handle.h"
 
 namespace clothstream::xr {
 
@@ -41,13 +41,19 @@ VkCommandBuffer FrameCommands::begin() {
   return buffers_[current_];
 }
 
-void FrameCommands::submit() {
+void FrameCommands::submit(VkSemaphore available, VkSemaphore drawn) {
   check(vkEndCommandBuffer(buffers_[current_]), "vkEndCommandBuffer");
   check(vkResetFences(device_.device, 1, &fences_[current_]), "vkResetFences");
   VkSubmitInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
   info.commandBufferCount = 1;
   info.pCommandBuffers = &buffers_[current_];
+  constexpr VkPipelineStageFlags kWaits = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
+  info.pWaitDstStageMask = &kWaits;
+  info.waitSemaphoreCount = available == VK_NULL_HANDLE ? 0 : 1;
+  info.pWaitSemaphores = &available;
+  info.signalSemaphoreCount = drawn == VK_NULL_HANDLE ? 0 : 1;
+  info.pSignalSemaphores = &drawn;
   check(vkQueueSubmit(device_.queue, 1, &info, fences_[current_]), "vkQueueSubmit");
 }
 
