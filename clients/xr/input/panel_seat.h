@@ -16,6 +16,9 @@ class PanelSeat {
   void comeBefore(const Pose& head);
   void comeBack() { pose_ = seat_; }
 
+  // The panel is here until the next call.
+  void sit(const Pose& pose) { seat_ = pose_ = pose; }
+
   // Middle of the upper edge in the room.
   const Pose& pose() const { return pose_; }
 

@@ -36,6 +36,10 @@ class Visit {
   // Vibrations that the last frame() caused.
   std::span<const Pulse> pulses() const { return {pulses_.data(), pulseCount_}; }
 
+  // Moves the panel to a pose in the room, for a flat view. Call it before frame().
+  void setPanelPose(const Pose& pose) { seat_.sit(pose); }
+  // Whether a press of this side holds the panel or the cloth.
+  bool isUsed(Side side) const { return panel_.isHeld(indexOf(side)) || touch_.grabber(side).holds(); }
   // Places scene and panel before the user in the next frame.
   void recenter() { isPlaced_ = false; }
   // Shows a text on the panel for a few seconds.
