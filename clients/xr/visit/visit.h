@@ -38,6 +38,8 @@ class Visit {
 
   // Moves the panel to a pose in the room, for a flat view. Call it before frame().
   void setPanelPose(const Pose& pose) { seat_.sit(pose); }
+  // Leaves the panel out of the stage. Call it after frame().
+  void hidePanel() { stage_.panel.visible = false; }
   // Whether a press of this side holds the panel or the cloth.
   bool isUsed(Side side) const { return panel_.isHeld(indexOf(side)) || touch_.grabber(side).holds(); }
   // Places scene and panel before the user in the next frame.
