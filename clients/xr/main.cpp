@@ -4,6 +4,7 @@
 #include <csignal>
 #include <ctime>
 #include <exception>
+#include <stdexcept>
 #include <string>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -80,10 +81,20 @@ int showInHeadsets(const ProgramOptions& options, Visit& visit) {
     try {
       if (!showUntilLost(options.headset, visit, wasShown)) return 0;
       lostUs = clothstream_now_us();
+      wasShown = true;
     } catch (const XrError& error) {
       if (said != error.what()) spdlog::warn("{}", error.what());
       said = error.what();
-      wasShown = wasShown || visit.frameTimes().summary(clothstream_now_us()).frames > 0;
+      if (visit.frameTimes().summary(clothstream_now_us()).frames > 0) {
+        spdlog::warn("The OpenXR runtime is lost; a new session follows as soon as it answers");
+        lostUs = clothstream_now_us();
+        wasShown = true;
+      }
+    } catch (const std::runtime_error& error) {
+      // A device that has drawn frames may do so again; else something is missing.
+      if (visit.frameTimes().summary(clothstream_now_us()).frames == 0) throw;
+      spdlog::warn("{}; a new session follows", error.what());
+      wasShown = true;
     }
     const std::uint64_t nowUs = clothstream_now_us();
     if (options.waitForRuntime >= 0 && static_cast<double>(nowUs - lostUs) > options.waitForRuntime * 1e6) {

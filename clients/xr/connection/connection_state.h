@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "clothstream/clothstream.h"
+#include <clothstream/clothstream.h>
 
 namespace clothstream::xr {
 

@@ -4,8 +4,9 @@
 
 #include <cstdint>
 
+#include <clothstream/core.h>
+
 #include "clients/xr/input/limb.h"
-#include "clothstream/core.h"
 
 namespace clothstream::xr {
 

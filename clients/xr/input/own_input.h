@@ -5,8 +5,9 @@
 #include <array>
 #include <cstdint>
 
+#include <clothstream/core.h>
+
 #include "clients/xr/input/sample.h"
-#include "clothstream/core.h"
 
 namespace clothstream::xr {
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "clients/xr/openxr/hand_trackers.h"
 
+#include <spdlog/spdlog.h>
+
 #include "clients/xr/openxr/actions.h"
 
 namespace clothstream::xr {
@@ -16,7 +18,12 @@ HandTrackers::HandTrackers(const Instance& instance, XrSession session) {
     auto info = typed<XrHandTrackerCreateInfoEXT>(XR_TYPE_HAND_TRACKER_CREATE_INFO_EXT);
     info.hand = side == indexOf(Side::left) ? XR_HAND_LEFT_EXT : XR_HAND_RIGHT_EXT;
     info.handJointSet = XR_HAND_JOINT_SET_DEFAULT_EXT;
-    check(create(session, &info, &trackers_[side]), "xrCreateHandTrackerEXT");
+    const XrResult result = create(session, &info, &trackers_[side]);
+    if (XR_SUCCEEDED(result)) continue;
+    // The user may have refused it.
+    trackers_[side] = XR_NULL_HANDLE;
+    spdlog::warn("The runtime refuses to track the {} hand: {}", side == 0 ? "left" : "right",
+                 nameOf(result));
   }
 }
 

@@ -80,10 +80,20 @@ Headset::Headset(const HeadsetOptions& options, Visit& visit)
       hands_(instance_, session_.get()),
       refreshRate_(instance_, session_.get(), options.refreshRate) {
   spdlog::info("{} shows {}", instance_.runtimeName(), instance_.systemName());
-  blending_ = chooseBlending(blendModes(instance_), instance_.extensions().passthrough, options.passThrough);
-  if (options.passThrough && blending_.background == Background::kRoom)
+  const std::vector<XrEnvironmentBlendMode> modes = blendModes(instance_);
+  blending_ = chooseBlending(modes, instance_.passesThrough(), options.passThrough);
+  if (blending_.usesLayer) {
+    try {
+      passThrough_ = std::make_unique<PassThroughLayer>(instance_, session_.get());
+    } catch (const XrError& error) {
+      spdlog::warn("{}", error.what());
+      blending_ = chooseBlending(modes, false, options.passThrough);
+    }
+  }
+  if (options.passThrough && blending_.background == Background::kRoom) {
+    spdlog::warn("This headset cannot show the real room");
     visit.say("This headset cannot show the real room", clothstream_now_us());
-  if (blending_.usesLayer) passThrough_ = std::make_unique<PassThroughLayer>(instance_, session_.get());
+  }
   visit.setBackground(blending_.background);
   if (instance_.extensions().convertTime)
     convertTime_ =

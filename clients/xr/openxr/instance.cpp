@@ -137,11 +137,17 @@ void Instance::findSystem() {
   if (const XrResult result = xrGetSystem(instance_, &wanted, &system_); XR_FAILED(result))
     explain(result, "xrGetSystem");
   auto hands = typed<XrSystemHandTrackingPropertiesEXT>(XR_TYPE_SYSTEM_HAND_TRACKING_PROPERTIES_EXT);
+  auto passThrough = typed<XrSystemPassthroughPropertiesFB>(XR_TYPE_SYSTEM_PASSTHROUGH_PROPERTIES_FB);
   auto system = typed<XrSystemProperties>(XR_TYPE_SYSTEM_PROPERTIES);
   if (extensions_.handTracking) system.next = &hands;
+  if (extensions_.passthrough) {
+    passThrough.next = system.next;
+    system.next = &passThrough;
+  }
   check(xrGetSystemProperties(instance_, system_, &system), "xrGetSystemProperties");
   systemName_ = system.systemName;
   tracksHands_ = extensions_.handTracking && hands.supportsHandTracking == XR_TRUE;
+  passesThrough_ = extensions_.passthrough && passThrough.supportsPassthrough == XR_TRUE;
 }
 
 XrPath Instance::path(const std::string& text) const {

@@ -37,8 +37,9 @@ class Instance {
   // Name and version of the runtime, and name of the headset.
   const std::string& runtimeName() const { return runtimeName_; }
   const std::string& systemName() const { return systemName_; }
-  // Whether the headset tracks hands.
+  // Whether the headset tracks hands, and has XR_FB_passthrough.
   bool tracksHands() const { return tracksHands_; }
+  bool passesThrough() const { return passesThrough_; }
 
   XrPath path(const std::string& text) const;
 
@@ -50,7 +51,7 @@ class Instance {
   XrSystemId system_ = XR_NULL_SYSTEM_ID;
   Extensions extensions_;
   std::string runtimeName_, systemName_;
-  bool tracksHands_ = false;
+  bool tracksHands_ = false, passesThrough_ = false;
 };
 
 // Number of messages of validation layers of OpenXR in this process; they are also logged as errors.

@@ -15,9 +15,12 @@ RefreshRateControl::RefreshRateControl(const Instance& instance, XrSession sessi
   const auto enumerate =
       functionOf<PFN_xrEnumerateDisplayRefreshRatesFB>(instance.get(), "xrEnumerateDisplayRefreshRatesFB");
   std::uint32_t count = 0;
-  check(enumerate(session, 0, &count, nullptr), "xrEnumerateDisplayRefreshRatesFB");
+  XrResult result = enumerate(session, 0, &count, nullptr);
   offered_.resize(count);
-  check(enumerate(session, count, &count, offered_.data()), "xrEnumerateDisplayRefreshRatesFB");
+  if (XR_SUCCEEDED(result)) result = enumerate(session, count, &count, offered_.data());
+  if (XR_SUCCEEDED(result)) return;
+  offered_.clear();
+  spdlog::warn("The runtime does not say which refresh rates the headset has: {}", nameOf(result));
 }
 
 void RefreshRateControl::suit(float streamRate) {

@@ -183,7 +183,7 @@ void Visit::showPanel(const InputSample& sample) {
   facts_.trouble = trouble.title;
   facts_.advice = trouble.advice;
   facts_.canRetry = connection_.phase() == Phase::refused;
-  if (!connection_.acquire().client() && trouble.title.empty())
+  if (connection_.clientNumber() == 0 && trouble.title.empty())
     facts_.status = "Connecting to " + connection_.options().address;
   panel_.show(facts_);
   if (hasTrouble_ != !trouble.title.empty()) {
