@@ -132,6 +132,11 @@ std::optional<ProgramOptions> readOptions(int count, char** arguments, int& exit
   app.add_option("--samples", samples,
                  "Samples of each pixel against stairs at edges: 1, 2, 4 or 8. Default: 4")
       ->check(CLI::IsMember({1, 2, 4, 8}));
+  ShadowDetail shadows = ShadowDetail::kFull;
+  app.add_option("--detail", shadows,
+                 "full, or reduced: shadows of few samples, for weak graphics devices. Default: full")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ShadowDetail>{
+          {"full", ShadowDetail::kFull}, {"reduced", ShadowDetail::kReduced}}));
   addHeadset(app, options);
   addFlat(app, options, flat);
   app.add_option("--font", options.font, "Font file for texts. Default: the sans-serif font of the system")
@@ -146,6 +151,7 @@ std::optional<ProgramOptions> readOptions(int count, char** arguments, int& exit
     return std::nullopt;
   }
   options.headset.samples = options.flat.samples = samples;
+  options.headset.shadows = shadows;
   return options;
 }
 

@@ -57,6 +57,14 @@ Eigen::Matrix4f matrixOf(const Pose& pose) {
   return matrix;
 }
 
+// Time that the processor has spent on this thread, without waiting.
+std::uint64_t threadCpuUs() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<std::uint64_t>(time.tv_sec) * 1'000'000 +
+         static_cast<std::uint64_t>(time.tv_nsec) / 1000;
+}
+
 // Largest number of samples that is wanted and that both formats allow.
 VkSampleCountFlagBits samplesOf(VkPhysicalDevice physical, std::uint32_t wanted) {
   VkPhysicalDeviceProperties properties;
@@ -136,6 +144,7 @@ void Headset::makePictures() {
   renderer.colour = colour;
   renderer.samples = samplesOf(device.physical, options_.samples);
   renderer.views = kEyes;
+  renderer.shadows = options_.shadows;
   renderer.largest = size;
   renderer_ = std::make_unique<Renderer>(device, renderer);
   commands_ = std::make_unique<FrameCommands>(device);
@@ -170,8 +179,7 @@ void Headset::frame() {
   const auto wait = typed<XrFrameWaitInfo>(XR_TYPE_FRAME_WAIT_INFO);
   auto state = typed<XrFrameState>(XR_TYPE_FRAME_STATE);
   check(xrWaitFrame(session_.get(), &wait, &state), "xrWaitFrame");
-  const std::uint64_t beginUs = clothstream_now_us();
-  waitedUs_ = 0;
+  const std::uint64_t beginUs = clothstream_now_us(), beginCpuUs = threadCpuUs();
   const auto begin = typed<XrFrameBeginInfo>(XR_TYPE_FRAME_BEGIN_INFO);
   check(xrBeginFrame(session_.get(), &begin), "xrBeginFrame");
   const XrTime time = state.predictedDisplayTime;
@@ -193,9 +201,8 @@ void Headset::frame() {
   } else {
     visit_.hidden(beginUs);
   }
-  const std::uint64_t endUs = clothstream_now_us();
   end(state, isDrawn);
-  if (isDrawn) visit_.addFrameTime(endUs, endUs - beginUs - waitedUs_);
+  if (isDrawn) visit_.addFrameTime(clothstream_now_us(), threadCpuUs() - beginCpuUs);
   refreshRate_.suit(visit_.streamRate());
 }
 
@@ -233,12 +240,9 @@ void Headset::draw() {
     renderer_->upload(stage);
     topology_ = stage.topology;
   }
-  // Time in which the runtime or the device are waited for is no cost of this program.
-  const std::uint64_t beforeUs = clothstream_now_us();
   colour_->acquire();
   if (depth_) depth_->acquire();
   const VkCommandBuffer commands = commands_->begin();
-  waitedUs_ += clothstream_now_us() - beforeUs;
   const Target target{colour_->view(), depth_ ? depth_->view() : VK_NULL_HANDLE, colour_->shape().size};
   renderer_->record(commands, target, views_, stage);
   const bool isKept = pictures_ && frames_ % options_.pictureEvery == 0;

@@ -25,9 +25,10 @@
 namespace clothstream::xr {
 
 struct HeadsetOptions {
-  bool passThrough = false;         // show the real room where the headset can
-  float refreshRate = 0;            // Hz; 0 means one that suits the stream
-  std::uint32_t samples = 4;        // per pixel: 1, 2, 4 or 8
+  bool passThrough = false;   // show the real room where the headset can
+  float refreshRate = 0;      // Hz; 0 means one that suits the stream
+  std::uint32_t samples = 4;  // per pixel: 1, 2, 4 or 8
+  ShadowDetail shadows = ShadowDetail::kFull;
   float scale = 1;                  // of the edges of pictures, relative to what the runtime recommends
   std::string eyePictures;          // folder; "" means none
   std::uint32_t pictureEvery = 90;  // displayed frames between eye pictures
@@ -79,7 +80,7 @@ class Headset {
   std::array<View, 2> views_{};
   std::array<XrCompositionLayerProjectionView, 2> shown_{};
   std::array<XrCompositionLayerDepthInfoKHR, 2> shownDepth_{};
-  std::uint64_t topology_ = 0, frames_ = 0, waitedUs_ = 0;
+  std::uint64_t topology_ = 0, frames_ = 0;
   bool movesRoom_ = false;
 };
 

@@ -28,18 +28,19 @@ Visit::Visit(ConnectionOptions options, TextPainter& painter)
 void Visit::frame(const InputSample& sample, std::uint64_t nowUs, std::uint64_t displayUs) {
   pulseCount_ = 0;
   events_ |= connection_.update(nowUs);
-  touch_.update(sample, placement_.toScene(), nowUs);
   {
     const Connection::Acquired acquired = connection_.acquire();
     cs_client* const client = acquired.client();
+    if (client && clientNumber_ != connection_.clientNumber()) {
+      clientNumber_ = connection_.clientNumber();
+      sender_.forget();
+      touch_.letGo();
+      placedWithScene_ = placedWithScene_ && sceneName_ == cs_scene_name(client);
+      sceneName_ = cs_scene_name(client);
+    }
+    place(sample, client);
+    touch_.update(sample, placement_.toScene(), nowUs);
     if (client) {
-      if (clientNumber_ != connection_.clientNumber()) {
-        clientNumber_ = connection_.clientNumber();
-        sender_.forget();
-        touch_.letGo();
-        placedWithScene_ = placedWithScene_ && sceneName_ == cs_scene_name(client);
-        sceneName_ = cs_scene_name(client);
-      }
       readEvents(client, nowUs);
       const ShownCloth cloth(client);
       point(&cloth, nowUs, client);
@@ -54,7 +55,6 @@ void Visit::frame(const InputSample& sample, std::uint64_t nowUs, std::uint64_t 
       point(nullptr, nowUs, nullptr);
     }
     if (nowUs - factsUs_ >= kFactsEvery) readFacts(client, nowUs);
-    place(sample, client);
     drawOwn(client);
   }
   showPanel(sample);
