@@ -114,7 +114,7 @@ Flat::Parts::Parts(const FlatOptions& flatOptions, Visit& shown) : options(flatO
     if (reason.empty()) {
       window = std::make_unique<Window>("ClothStream", size);
     } else {
-      options.pictures = ".";
+      options.pictures.assign(1, '.');
       spdlog::info("There is no window ({}); pictures are written to the present folder", reason);
     }
   }

@@ -52,11 +52,15 @@ Textures::Textures(const GraphicsDevice& device) {
 void Textures::makeSamplers(const GraphicsDevice& device) {
   VkPhysicalDeviceFeatures features{};
   vkGetPhysicalDeviceFeatures(device.physical, &features); // DeviceRequest turns anisotropy on where it is
+  VkPhysicalDeviceProperties properties{};
+  vkGetPhysicalDeviceProperties(device.physical, &properties);
+  // Mesa's software device takes minutes for a picture with anisotropy.
+  const bool isSoftware = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   VkSamplerCreateInfo info{};
   info.magFilter = info.minFilter = VK_FILTER_LINEAR;
   info.mipmapMode = VK_SAMPLER_MIPMAP_MODE_LINEAR;
   info.maxLod = VK_LOD_CLAMP_NONE;
-  info.anisotropyEnable = features.samplerAnisotropy;
+  info.anisotropyEnable = isSoftware ? VK_FALSE : features.samplerAnisotropy;
   info.maxAnisotropy = 2;
   tiled_ = sampler(device.device, info);
   info.addressModeU = info.addressModeV = info.addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
