@@ -30,7 +30,9 @@ constexpr float kNear = 0.05F, kFar = 100; // m
 constexpr auto kFrameTime = std::chrono::microseconds(16'667);
 // Longest time to wait for the scene before a picture is made without it.
 constexpr auto kLongestWait = std::chrono::seconds(15);
-constexpr std::size_t kWarmUp = 30; // frames whose cost is not counted
+// Time that the scene is shown before the first picture, so that the panel has everything.
+constexpr auto kSettles = std::chrono::seconds(1);
+constexpr std::size_t kWarmUp = 10; // frames whose cost is not counted
 // Place of the panel's upper edge before the camera, m: in the left upper corner, or in the middle for trouble.
 constexpr float kPanelAway = 1.5F, kPanelEdge = 0.03F;
 // A mouse is a controller behind the camera, where it touches no cloth.
@@ -102,7 +104,7 @@ struct Flat::Parts {
   std::uint64_t uploaded = 0, aimedAt = 0;
   std::uint32_t frames = 0, pictures = 0;
   Pose aimedFrom;
-  Clock::time_point start = Clock::now(), next = start;
+  Clock::time_point start = Clock::now(), next = start, shownSince = start;
   MouseInput mouse;
   float windowAspect = 1;
 };
@@ -180,6 +182,7 @@ void Flat::Parts::placeCamera(float aspect) {
   const Pose& toScene = visit.toScene();
   const bool hasMoved = (toScene.position - aimedFrom.position).norm() > 1e-4F;
   if (stage.topology != 0 && (aimedAt != stage.topology || hasMoved)) {
+    if (aimedAt == 0) shownSince = Clock::now();
     aimedAt = stage.topology;
     aimedFrom = toScene;
     camera.lookAt(inverse(toScene).apply(stage.centre), stage.radius, aspect);
@@ -205,7 +208,8 @@ void Flat::Parts::makeStage(float aspect) {
 
 // Whether a picture shows what it should: the scene, or what is in its way.
 bool Flat::Parts::isReady() const {
-  const bool hasScene = visit.stage().topology != 0 && visit.connection().phase() == Phase::live && aimedAt != 0;
+  const bool hasScene = visit.stage().topology != 0 && visit.connection().phase() == Phase::live && aimedAt != 0 &&
+                        Clock::now() - shownSince > kSettles;
   return hasScene || visit.connection().phase() == Phase::refused || Clock::now() - start > kLongestWait;
 }
 

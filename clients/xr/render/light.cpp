@@ -109,9 +109,9 @@ void fitToStage(const Stage& stage, shaders::Frame& frame) {
   const bool isNear = std::hypot(stage.centre.x(), stage.centre.z()) < 2;
   const float reach = std::max(14.0F, 9 * stage.radius);
   frame.floorMiddle = {isNear ? 0 : stage.centre.x(), stage.floor, isNear ? 0 : stage.centre.z(), reach};
-  frame.floorColour = widened(fromSrgb(0xcdbfae), 0.5F);
-  frame.outside = widened(fromSrgb(0xd9d3c8));
-  frame.zenith = widened(fromSrgb(0xb9c2cc));
+  frame.floorColour = widened(fromSrgb(0xa09789), 0.5F);
+  frame.outside = widened(fromSrgb(0xcbc6bd));
+  frame.zenith = widened(fromSrgb(0xeef0f0));
   frame.background = static_cast<std::uint32_t>(stage.background);
 }
 

@@ -46,7 +46,8 @@ struct Renderer::Parts {
 
   void gatherNormals(VkCommandBuffer commands, const Stage& stage) const;
   void drawShadows(VkCommandBuffer commands, const Stage& stage) const;
-  void drawPicture(VkCommandBuffer commands, const Target& target, const Stage& stage, std::uint32_t quads);
+  void drawPicture(VkCommandBuffer commands, const Target& target, const Stage& stage, VkDescriptorSet set,
+                   std::uint32_t quads);
   void drawMeshes(VkCommandBuffer commands, const Stage& stage, PipelineKind kind) const;
   void drawSolids(VkCommandBuffer commands, SolidClass which, PipelineKind kind) const;
   void bind(VkCommandBuffer commands, PipelineKind kind) const {
@@ -92,7 +93,7 @@ void Renderer::record(VkCommandBuffer commands, const Target& target, std::span<
   vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, layout, 0, 1, &set, 0, nullptr);
   parts.gatherNormals(commands, stage);
   parts.drawShadows(commands, stage);
-  parts.drawPicture(commands, target, stage, quads);
+  parts.drawPicture(commands, target, stage, set, quads);
 }
 
 void Renderer::Parts::gatherNormals(VkCommandBuffer commands, const Stage& stage) const {
@@ -129,7 +130,7 @@ void Renderer::Parts::drawShadows(VkCommandBuffer commands, const Stage& stage) 
 }
 
 void Renderer::Parts::drawPicture(VkCommandBuffer commands, const Target& target, const Stage& stage,
-                                  std::uint32_t quads) {
+                                  VkDescriptorSet set, std::uint32_t quads) {
   std::array<VkClearValue, 2> clear{};
   clear[1].depthStencil.depth = 1;
   VkRenderPassBeginInfo begin{};
@@ -140,6 +141,8 @@ void Renderer::Parts::drawPicture(VkCommandBuffer commands, const Target& target
   begin.clearValueCount = clear.size();
   begin.pClearValues = clear.data();
   vkCmdBeginRenderPass(commands, &begin, VK_SUBPASS_CONTENTS_INLINE);
+  // A pass with multiview begins without anything bound.
+  vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipelines.layout(), 0, 1, &set, 0, nullptr);
   setViewport(commands, target.size);
   drawSolids(commands, SolidClass::kHides, PipelineKind::kSolid);
   drawSolids(commands, SolidClass::kOpaque, PipelineKind::kSolid);

@@ -26,7 +26,7 @@ void main() {
     return;
   }
   float spacing = frame.floorColour.w;
-  float grid = max(0.34 * lines(inPlace.xz, spacing, 0.004 * spacing), 0.6 * lines(inPlace.xz, 5.0 * spacing, 0.006 * spacing));
+  float grid = max(0.6 * lines(inPlace.xz, spacing, 0.006 * spacing), lines(inPlace.xz, 5.0 * spacing, 0.01 * spacing));
   Material m;
   m.colour = frame.floorColour.rgb * (1.0 - 0.45 * grid);
   m.roughness = 0.55;
