@@ -50,6 +50,14 @@ clothstream_package(development_group libclothstream-dev libdevel "libclothstrea
   "Headers, and files for CMake and pkg-config, of libclothstream. Also fixtures
 that read recordings in tests of other programs, and the packages for npm and
 Unity.")
+if(CLOTHSTREAM_XR)
+  list(APPEND CPACK_COMPONENTS_ALL xr xr_system)
+  clothstream_package(xr_group clothstream-xr net "mesa-vulkan-drivers | vulkan-icd, fonts-dejavu-core" ""
+    "client for cloth streams in OpenXR headsets"
+    "The command clothstream-xr shows scenes of a ClothStream server in a headset
+with an OpenXR runtime, such as SteamVR, Monado or WiVRn. Hands and controllers
+touch the cloth. Without a headset it opens a window or writes pictures.")
+endif()
 
 set(debian ${CMAKE_CURRENT_SOURCE_DIR}/debian)
 set(CPACK_DEBIAN_SERVER_GROUP_PACKAGE_CONTROL_EXTRA ${debian}/conffiles ${debian}/postinst ${debian}/prerm ${debian}/postrm)
@@ -58,7 +66,11 @@ set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY ">=")
 
 include(CPack)
-foreach(part server client library development)
+set(groups server client library development)
+if(CLOTHSTREAM_XR)
+  list(APPEND groups xr)
+endif()
+foreach(part IN LISTS groups)
   cpack_add_component_group(${part}_group)
   foreach(component ${part} ${part}_system)
     cpack_add_component(${component} GROUP ${part}_group)

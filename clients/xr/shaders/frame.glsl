@@ -1,0 +1,6 @@
+// SPDX-License-Identifier: MIT
+// The frame, and what view is drawn.
+#extension GL_EXT_multiview : require
+#include "clients/xr/shaders/records.h"
+
+layout(set = 0, binding = kFrameBinding, std140) uniform FrameBlock { Frame frame; };
