@@ -157,7 +157,7 @@ def short_dress():
 
 def gown():
     length = 0.019  # m, sides of the triangles
-    # A ball is as large as the shortest side permits. The cape is heavier than the dress, so that the air lifts it less.
+    # Balls are as large as the shortest side permits. The cape is heavier than the dress, so that air lifts it less.
     settings = {"thickness": 0.006, "friction": 0.3, "damping": 0.5, "tethers": {},
                 "solver": {"xpbd": {"iterations": 3}}, "selfCollision": {"radius": 0.0092}}
     write("gown", "A figure in a gown and a cape walks in a circle. For GPUs: more than nine thousand nodes.",

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Makes docs/picture.png and docs/cloth.webp: the page with a collider in the curtain, and one swing of the collider.
-// Makes docs/images/dress.png: the figure of the scene "dress".
+// Makes docs/images/dress.png and gown.png: the figures of the scenes "dress" and "gown".
 //   CLOTHSTREAM_SERVER=build/release/bin/clothstream-server node tests/page/picture.mjs
 // Needs Chromium, and img2webp of Debian's package webp.
 
@@ -36,7 +36,7 @@ async function writePushedCurtain(folder) {
 }
 
 async function untilSecond(page, second) {
-  await page.waitForFunction((end) => window.clothstream.statistics.tick / 72 > end, second);
+  await page.waitForFunction((end) => window.clothstream.statistics.tick / 72 > end, second, { timeout: 0 });
 }
 
 const folder = await mkdtemp(join(tmpdir(), "clothstream-picture-"));
@@ -53,14 +53,16 @@ try {
   await page.close();
   await server.stop();
 
-  server = await startServer(0, ["--scene", "dress"]);
-  const dressed = await openPage(browser, server.url, { viewport: kSmall });
-  await untilState(dressed, "live");
-  await dressed.addStyleTag({ content: "#notice, .card { display: none !important; }" });
-  await untilSecond(dressed, kWalked);
-  await dressed.screenshot({ path: join(kDocs, "images", "dress.png"), clip: kFigure });
-  await dressed.close();
-  await server.stop();
+  for (const scene of ["dress", "gown"]) {
+    server = await startServer(0, ["--scene", scene]);
+    const dressed = await openPage(browser, server.url, { viewport: kSmall });
+    await untilState(dressed, "live");
+    await dressed.addStyleTag({ content: "#notice, .card { display: none !important; }" });
+    await untilSecond(dressed, kWalked);
+    await dressed.screenshot({ path: join(kDocs, "images", `${scene}.png`), clip: kFigure });
+    await dressed.close();
+    await server.stop();
+  }
 
   server = await startServer(0, ["--scene", "curtain", "--record", folder]);
   const recorded = await openPage(browser, server.url);
