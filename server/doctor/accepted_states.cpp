@@ -21,6 +21,7 @@ constexpr AcceptedState kStates[] = {
     {"figure_15", 0x236b053bf25874e8u},
     {"flag", 0x4aec43f3a916dfafu},
     {"folds", 0x5081340b01b55416u},
+    {"gown", 0x0b87a1cab523a801u},
     {"obstacles", 0x616ce6f10a7ba85du},
     {"solver_acad", 0xec9a152b77f0cddfu},
     {"solver_constraint", 0xe4f72c0d1a0900a9u},

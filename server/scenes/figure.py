@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# The figure of the scene `dress`: its joints, its shape as a field of distances, and its walk.
+# The figure of the scenes `dress` and `gown`: its joints, its shape as a field of distances, and its walk.
 # Metres, y upwards, the figure looks along -Z; its right side is at +X.
 import math
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-# Writes dress.json: a figure that walks in a circle, in a dress that follows its joints. figure.py has the figure and
-# its walk, garments.py the dress. With `--check` it writes nothing and compares. It takes half a minute.
+# Writes dress.json and gown.json: a figure that walks in a circle, in clothes that follow its joints. figure.py has the
+# figure and its walk, garments.py the clothes. With `--check` it writes nothing and compares. It takes two minutes.
 import json
 import math
 import pathlib
@@ -17,11 +17,17 @@ HIPS = figure.NAMES.index("hips")
 SPINE = figure.NAMES.index("spine")
 CHEST = figure.NAMES.index("chest")
 TIGHT = 0.93  # m, height above which the dress is tight
+COLLAR = 1.35  # m, height above which the cape is tight
 
-SKIRT = figure.Profile([(0.45, 0.375, 0.350, 0.018), (0.80, 0.260, 0.225, 0.018), (0.88, 0.225, 0.180, 0.018),
+SHORT = figure.Profile([(0.45, 0.375, 0.350, 0.018), (0.80, 0.260, 0.225, 0.018), (0.88, 0.225, 0.180, 0.018),
                         (0.93, 0.202, 0.148, 0.016), (0.97, 0.184, 0.126, 0.012), (1.01, 0.160, 0.106, 0.008),
                         (1.04, 0.132, 0.088, 0.004)])
-HEM, LENGTH = 0.52, 0.0325  # m, height of the hem, and sides of the triangles
+LONG = figure.Profile([(0.05, 0.470, 0.475, 0.030), (0.15, 0.445, 0.445, 0.028), (0.50, 0.330, 0.320, 0.022),
+                       (0.80, 0.250, 0.210, 0.018), (0.88, 0.222, 0.176, 0.018), (0.93, 0.202, 0.148, 0.016),
+                       (0.97, 0.184, 0.126, 0.012), (1.01, 0.160, 0.106, 0.008), (1.04, 0.132, 0.088, 0.004)])
+MANTLE = figure.Profile([(0.10, 0.480, 0.520, 0.030), (0.50, 0.395, 0.385, 0.022), (0.95, 0.295, 0.215, 0.014),
+                         (1.15, 0.265, 0.160, 0.006), (1.25, 0.258, 0.138, 0.004), (1.33, 0.240, 0.110, 0.004),
+                         (1.38, 0.170, 0.075, 0.006)])
 
 
 class Body:
@@ -39,12 +45,21 @@ def dress_weights(p):
     return figure.four({HIPS: hips / total, SPINE: (1 - hips) * (1 - chest) / total, CHEST: chest / total})
 
 
-def dress_distance(p):
-    if p[1] >= TIGHT:
+def distance_below(height, p):
+    """Tight above this height; the limit grows to 10 cm over the next 10 cm, and the rest is unbounded."""
+    if p[1] >= height:
         return 0
-    if p[1] < TIGHT - 0.10:
+    if p[1] < height - 0.10:
         return -1  # unbounded
-    return round(max(0.001, 0.10 * ((TIGHT - p[1]) / 0.10)), 4)
+    return round(max(0.001, height - p[1]), 4)
+
+
+def dress_distance(p):
+    return distance_below(TIGHT, p)
+
+
+def cape_distance(p):
+    return distance_below(COLLAR, p)
 
 
 def vector(p):
@@ -103,12 +118,22 @@ def avatar(body):
                      "skin": {"joints": joints, **skin(body.weights), "animation": {"keys": walk}}}}
 
 
-def dress(settings):
-    points, triangles = arranged(*garments.dress(SKIRT, HEM, LENGTH), dress_distance)
+def dress(profile, hem, length, settings):
+    points, triangles = arranged(*garments.dress(profile, hem, length), dress_distance)
     print(f"dress: {len(points)} nodes, {len(triangles)} triangles")
     return {"name": "dress", "mesh": mesh(points, triangles), **settings,
             "skin": {"collider": "avatar", **skin([dress_weights(p) for p in points]),
                      "maxDistances": [dress_distance(p) for p in points]}}
+
+
+def cape(hem, length, settings):
+    points, triangles = arranged(*garments.cape(MANTLE, hem, length), cape_distance)
+    print(f"cape: {len(points)} nodes, {len(triangles)} triangles")
+    return {"name": "cape", "mesh": mesh(points, triangles), **settings,
+            "skin": {"collider": "avatar", **skin([{CHEST: 1}] * len(points)),
+                     "maxDistances": [cape_distance(p) for p in points],
+                     "backstopDistances": [0.02 if p[1] > 0.95 else 0 for p in points],
+                     "backstopRadii": [0.3 if p[1] > 0.95 else 0 for p in points]}}
 
 
 def write(name, description, body, cloths, settings):
@@ -123,12 +148,26 @@ def write(name, description, body, cloths, settings):
     print(f"{name}: {len(body.points)} vertices and {len(body.triangles)} triangles of the body, {len(text)} bytes")
 
 
-def main():
-    body = Body(0.042)
+def short_dress():
     settings = {"material": "cotton", "thickness": 0.006, "friction": 0.3, "damping": 0.5, "tethers": {},
                 "solver": {"xpbd": {"iterations": 5}}}
-    write("dress", "A figure in a dress walks in a circle. The bodice follows its joints, the skirt swings.", body,
-          [dress(settings)], {"substeps": 4})
+    write("dress", "A figure in a dress walks in a circle. The bodice follows its joints, the skirt swings.",
+          Body(0.042), [dress(SHORT, 0.52, 0.0325, settings)], {"substeps": 4})
+
+
+def gown():
+    length = 0.019  # m, sides of the triangles
+    # Balls are as large as the shortest side permits. The cape is heavier than the dress, so that air lifts it less.
+    settings = {"thickness": 0.006, "friction": 0.3, "damping": 0.5, "tethers": {},
+                "solver": {"xpbd": {"iterations": 3}}, "selfCollision": {"radius": 0.0092}}
+    write("gown", "A figure in a gown and a cape walks in a circle. For GPUs: more than nine thousand nodes.",
+          Body(0.032), [dress(LONG, 0.15, length, {"material": "silk", **settings}),
+                        cape(0.37, length, {"material": "cotton", **settings})], {"substeps": 16})
+
+
+def main():
+    short_dress()
+    gown()
 
 
 main()

@@ -23,7 +23,8 @@ TEST_P(NamedScene, LoadsByName) {
 // tests/encode and Dressed in tests/simulation run on the device.
 std::vector<std::string> scenesWithoutSolids() {
   std::vector<std::string> names = namedScenes();
-  std::erase_if(names, [](const std::string& name) { return name == "dress" || name == "walker"; });
+  std::erase_if(
+      names, [](const std::string& name) { return name == "dress" || name == "gown" || name == "walker"; });
   return names;
 }
 
@@ -71,6 +72,7 @@ TEST(NamedScenes, AreAllListed) {
                                                      "figure_15",
                                                      "flag",
                                                      "folds",
+                                                     "gown",
                                                      "obstacles",
                                                      "solver_acad",
                                                      "solver_constraint",

@@ -45,6 +45,12 @@ model::ParticipantPoses posesAt(std::uint32_t tick, std::uint32_t ticks, const m
 
 }  // namespace
 
+std::vector<std::string> keptScenes() {
+  std::vector<std::string> names = messages::namedScenes();
+  std::erase(names, "gown");
+  return names;
+}
+
 std::uint32_t ticksFor(const model::Scene& scene) {
   constexpr std::uint32_t kNodeFrames = 60'000, kMinFrames = 12, kMaxFrames = 40;
   // The geometry of a mesh takes as much space as its frames.

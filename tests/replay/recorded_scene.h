@@ -5,11 +5,15 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "server/model/scene.h"
 #include "server/vulkan/device.h"
 
 namespace clothstream::replay {
+
+// The named scenes with a kept recording. That of `gown` would be larger than 150 kB, the limit for a file.
+std::vector<std::string> keptScenes();
 
 // Length of this scene's recordings in ticks: enough for some frames, and small files.
 std::uint32_t ticksFor(const model::Scene& scene);

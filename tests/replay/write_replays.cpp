@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Records every named scene for tests/replay (docs/recording.md): write_replays DIRECTORY [SCENE...].
+// Records the scenes that tests/replay keeps (docs/recording.md): write_replays DIRECTORY [SCENE...].
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "server/messages/scene_file.h"
 #include "tests/e2e/temporary_directory.h"
 #include "tests/replay/recorded_scene.h"
 
@@ -18,7 +17,7 @@ int main(int argc, char** argv) {
   }
   try {
     const std::vector<std::string> scenes =
-        argc > 2 ? std::vector<std::string>(argv + 2, argv + argc) : messages::namedScenes();
+        argc > 2 ? std::vector<std::string>(argv + 2, argv + argc) : replay::keptScenes();
     vulkan::Device device(vulkan::DeviceOptions{});
     const e2e::TemporaryDirectory directory;
     for (const std::string& name : scenes) {

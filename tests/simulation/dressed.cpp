@@ -9,6 +9,7 @@
 
 #include "server/model/cloth_skin.h"
 #include "server/reference/solid.h"
+#include "tests/simulation/intersections.h"
 
 namespace clothstream::tests {
 namespace {
@@ -53,6 +54,9 @@ void Walk::measurePositions(const simulation::TickInputs& inputs) {
     }
     first += places.size();
   }
+  if (std::ranges::any_of(scene_.cloths,
+                          [](const model::Cloth& cloth) { return cloth.selfCollision.has_value(); }))
+    raise(wear_.crossings, wear_.crossingsTick, intersections(scene_, positions), ticks_);
 }
 
 double Walk::nearestExact() {
@@ -78,9 +82,9 @@ double Walk::nearestExact() {
 std::string Walk::text() const {
   return fmt::format(
       "deepest {:.2f} mm in tick {}, p99 strain {:.2f} % in tick {}, {:.2f} % beyond the largest distance in "
-      "tick {}, exact nodes {:.4f} mm astray",
+      "tick {}, exact nodes {:.4f} mm astray, {} edges through triangles in tick {}",
       1e3 * wear_.depth, wear_.depthTick, 1e2 * wear_.strain, wear_.strainTick, 1e2 * wear_.excess,
-      wear_.excessTick, 1e3 * wear_.astray);
+      wear_.excessTick, 1e3 * wear_.astray, wear_.crossings, wear_.crossingsTick);
 }
 
 }  // namespace clothstream::tests

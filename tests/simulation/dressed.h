@@ -2,6 +2,7 @@
 // Measures how well clothes stay on a figure that walks.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -13,11 +14,12 @@ namespace clothstream::tests {
 
 // The worst values of a walk.
 struct Wear {
-  double depth = 0;   // m, of a node below the surface of a collider
-  double strain = 0;  // 99th percentile over the structural springs of a cloth
-  double excess = 0;  // distance from the skinned place over the largest distance, less 1
-  double astray = 0;  // m, of a node that follows its joints exactly, from its place
-  std::uint64_t depthTick = 0, strainTick = 0, excessTick = 0;
+  double depth = 0;           // m, of a node below the surface of a collider
+  double strain = 0;          // 99th percentile over the structural springs of a cloth
+  double excess = 0;          // distance from the skinned place over the largest distance, less 1
+  double astray = 0;          // m, of a node that follows its joints exactly, from its place
+  std::size_t crossings = 0;  // edges through triangles, of cloths with self-collision
+  std::uint64_t depthTick = 0, strainTick = 0, excessTick = 0, crossingsTick = 0;
 };
 
 // A scene with a figure as its first collider, whose joints its cloths follow.
