@@ -17,9 +17,12 @@ const kDesktop = { width: 1280, height: 800 };
 const kMoving = { width: 560, height: 400 };
 const kSwing = 5; // s, period of the collider's motion
 const kSmall = { width: 640, height: 480 };
-const kFigure = { x: 0, y: 80, width: 300, height: 250 }; // part of the page where the figure then is, in pixels
+// Scenes with a figure, a time in s when clothes are well seen, and the part of the page where the figure then is.
+const kFigures = [
+  { scene: "dress", second: 4, clip: { x: 0, y: 80, width: 300, height: 250 } },
+  { scene: "gown", second: 2.8, clip: { x: 40, y: 80, width: 300, height: 250 } },
+];
 const kStart = 6.25; // s, after the first swing
-const kWalked = 4; // s, when the figure comes towards the camera
 const kFramesPerSecond = 12;
 const kSlow = 0.1; // speed of the playback while frames are taken
 
@@ -53,13 +56,13 @@ try {
   await page.close();
   await server.stop();
 
-  for (const scene of ["dress", "gown"]) {
+  for (const { scene, second, clip } of kFigures) {
     server = await startServer(0, ["--scene", scene]);
     const dressed = await openPage(browser, server.url, { viewport: kSmall });
     await untilState(dressed, "live");
     await dressed.addStyleTag({ content: "#notice, .card { display: none !important; }" });
-    await untilSecond(dressed, kWalked);
-    await dressed.screenshot({ path: join(kDocs, "images", `${scene}.png`), clip: kFigure });
+    await untilSecond(dressed, second);
+    await dressed.screenshot({ path: join(kDocs, "images", `${scene}.png`), clip });
     await dressed.close();
     await server.stop();
   }
