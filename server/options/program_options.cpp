@@ -465,7 +465,7 @@ CLI::App& addDoctorCommand(OptionTable& table, Parsed& parsed) {
                "Time for measuring the sizes of cloth that the device carries. 0 leaves it out");
   table.flag("--accept", options.accepts,
              "Also simulate a thousand ticks of each built-in scene, and compare the states with those that "
-             "every device must reach. Takes about two minutes on two processors");
+             "every device must reach. Takes about a quarter of an hour on two processors");
   table.text("--report", options.report, "FILE", "Write the findings to this file, as JSON");
   table.flag("--json", options.json, "Print the findings as JSON");
   command.footer(

@@ -22,7 +22,7 @@ const kMiddle = { x: 100, y: 160, width: 720, height: 600 };
 // before, away from the scene (pixels).
 const kPictures = [
   { scene: "dress", second: 4, part: { x: 0, y: 120, width: 640, height: 560 } },
-  { scene: "gown", second: 4, part: { x: 0, y: 120, width: 640, height: 560 } },
+  { scene: "gown", second: 2.8, part: { x: 0, y: 120, width: 640, height: 560 } },
   { scene: "balloon", second: 0.5, part: kMiddle, zoom: 600 },
   { scene: "cushion", second: 4.5, part: kMiddle },
 ];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The gown and the cape of the built-in figure stay on it, outside of it, and apart, for five seconds. Takes
-// about three minutes on two cores of lavapipe.
+// about five minutes on two cores of lavapipe.
 #include <iostream>
 
 #include <gtest/gtest.h>
