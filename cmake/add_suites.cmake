@@ -31,7 +31,11 @@ endfunction()
 function(add test testLabels tests)
   string(REPLACE ";" ":" filter "${tests}")
   add_test(${test} ${program} --gtest_filter=${filter} --gtest_brief=1)
-  set_tests_properties(${test} PROPERTIES LABELS "${testLabels}" ENVIRONMENT "${environment}" TIMEOUT 900
+  set(timeout 900)
+  if("long" IN_LIST testLabels)
+    set(timeout 3600)
+  endif()
+  set_tests_properties(${test} PROPERTIES LABELS "${testLabels}" ENVIRONMENT "${environment}" TIMEOUT ${timeout}
     WORKING_DIRECTORY ${directory})
 endfunction()
 
