@@ -13,7 +13,7 @@ Pose headAt(const Eigen::Vector3f& position, float yaw) {
   return {position, Eigen::Quaternionf(Eigen::AngleAxisf(yaw, Eigen::Vector3f::UnitY()))};
 }
 
-TEST(XrPlacement, FrontOfTheSceneIsAnArmBeforeTheUserOnTheFloor) {
+TEST(XrPlacement, PutsFrontOfSceneAnArmAheadOnTheFloor) {
   const SceneBounds bounds{{-1, 0.2f, -1}, {1, 2, 0.4f}};
   Placement placement;
   // The user looks along -X.

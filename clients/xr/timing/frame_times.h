@@ -20,7 +20,7 @@ class FrameTimes {
   void add(std::uint64_t nowUs, std::uint64_t cpuUs);
   // Number of all frames so far.
   std::uint64_t total() const { return total_; }
-  // Of the frames that ended in the second before nowUs.
+  // Sums up the frames that ended in the second before nowUs.
   Summary summary(std::uint64_t nowUs) const;
 
  private:
