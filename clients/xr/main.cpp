@@ -46,10 +46,10 @@ void logCosts(const Visit& visit, std::uint64_t nowUs) {
 }
 
 // Shows frames until the runtime is lost (true) or the program ends (false). Throws an XrError if it is lost
-// in a call.
-bool showUntilLost(const HeadsetOptions& options, Visit& visit, bool isAgain) {
+// in a call. Adds 1 to the number of sessions when there is one.
+bool showUntilLost(const HeadsetOptions& options, Visit& visit, std::uint64_t& sessions) {
   Headset headset(options, visit);
-  if (isAgain) visit.say("The OpenXR runtime has started again", clothstream_now_us());
+  if (sessions++ > 0) visit.say("The OpenXR runtime has started again", clothstream_now_us());
   // The runtime ends the session in its own time, but not for longer than this.
   constexpr std::uint64_t kLongestExitUs = 2'000'000;
   std::uint64_t exitUs = 0;
@@ -75,12 +75,12 @@ bool showUntilLost(const HeadsetOptions& options, Visit& visit, bool isAgain) {
 // Returns the exit status.
 int showInHeadsets(const ProgramOptions& options, Visit& visit) {
   std::string said;
-  std::uint64_t lostUs = clothstream_now_us();
+  std::uint64_t lostUs = clothstream_now_us(), sessions = 0;
   while (!isEnding() && !visit.leaves()) {
-    const std::uint64_t framesBefore = visit.frameTimes().total();
+    const std::uint64_t framesBefore = visit.frameTimes().total(), sessionsBefore = sessions;
     std::string error;
     try {
-      if (!showUntilLost(options.headset, visit, framesBefore > 0)) return 0;
+      if (!showUntilLost(options.headset, visit, sessions)) return 0;
       error = "The OpenXR session is lost";
     } catch (const XrError& lost) {
       error = lost.what();
@@ -90,7 +90,7 @@ int showInHeadsets(const ProgramOptions& options, Visit& visit) {
       error = lost.what();
     }
     const std::uint64_t nowUs = clothstream_now_us();
-    if (visit.frameTimes().total() > framesBefore) {
+    if (sessions > sessionsBefore) {
       spdlog::warn("{}. A new session follows as soon as the OpenXR runtime answers", error);
       lostUs = nowUs;
       said.clear();
