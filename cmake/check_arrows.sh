@@ -69,6 +69,19 @@ clients/files      | proto/codec proto/text clothstream
 clients/measure    | clients/core
 clients/load       | clients/core clients/datagram clients/native clients/grpc clients/websocket proto/codec clothstream
 clients/cli        | proto/checksum proto/text proto/discovery clients/core clients/datagram clients/recording clients/native clients/grpc clients/files clients/load proto/codec proto/parameters proto/recording proto/tls clothstream clients/measure
+clients/xr         | clients/xr/connection clients/xr/flat clients/xr/openxr
+clients/xr/geometry |
+clients/xr/text    |
+clients/xr/timing  |
+clients/xr/connection |
+clients/xr/stage   | clients/xr/geometry clients/xr/text proto/hands
+clients/xr/panel   | clients/xr/stage clients/xr/text
+clients/xr/shaders |
+clients/xr/render  | clients/xr/shaders clients/xr/stage
+clients/xr/input   | clients/xr/geometry proto/hands
+clients/xr/visit   | clients/xr/connection clients/xr/input clients/xr/panel clients/xr/stage clients/xr/timing
+clients/xr/flat    | clients/xr/geometry clients/xr/render clients/xr/visit
+clients/xr/openxr  | clients/xr/input clients/xr/render clients/xr/stage clients/xr/timing clients/xr/visit
 '
 # rooms that may include these headers
 readonly OUTSIDE='
@@ -87,10 +100,15 @@ readonly OUTSIDE='
 <zip.h             | clients/files
 <nats/             | server/fleet clients/cli
 <avahi-            | server/discovery clients/cli
-<Eigen/            | server/model server/reference
+<Eigen/            | server/model server/reference clients/xr/geometry clients/xr/stage clients/xr/panel clients/xr/render clients/xr/flat clients/xr/shaders
 <draco/            | server/meshes
 <tiny_gltf         | server/meshes clients/cli
 <tiny_obj          | server/meshes
+<openxr/           | clients/xr/openxr
+<volk.h            | clients/xr/openxr clients/xr/render
+<GLFW/             | clients/xr/flat
+<ft2build.h        | clients/xr/text
+<fontconfig/       | clients/xr/text
 '
 
 failed=0

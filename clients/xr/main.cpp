@@ -46,10 +46,10 @@ void logCosts(const Visit& visit, std::uint64_t nowUs) {
 }
 
 // Shows frames until the runtime is lost (true) or the program ends (false). Throws an XrError if it is lost
-// in a call.
-bool showUntilLost(const HeadsetOptions& options, Visit& visit, bool isAgain) {
+// in a call. Adds 1 to the number of sessions when there is one.
+bool showUntilLost(const HeadsetOptions& options, Visit& visit, std::uint64_t& sessions) {
   Headset headset(options, visit);
-  if (isAgain) visit.say("The OpenXR runtime has started again", clothstream_now_us());
+  if (sessions++ > 0) visit.say("The OpenXR runtime has started again", clothstream_now_us());
   // The runtime ends the session in its own time, but not for longer than this.
   constexpr std::uint64_t kLongestExitUs = 2'000'000;
   std::uint64_t exitUs = 0;
@@ -75,28 +75,29 @@ bool showUntilLost(const HeadsetOptions& options, Visit& visit, bool isAgain) {
 // Returns the exit status.
 int showInHeadsets(const ProgramOptions& options, Visit& visit) {
   std::string said;
-  std::uint64_t lostUs = clothstream_now_us();
-  bool wasShown = false;
+  std::uint64_t lostUs = clothstream_now_us(), sessions = 0;
   while (!isEnding() && !visit.leaves()) {
+    const std::uint64_t framesBefore = visit.frameTimes().total(), sessionsBefore = sessions;
+    std::string error;
     try {
-      if (!showUntilLost(options.headset, visit, wasShown)) return 0;
-      lostUs = clothstream_now_us();
-      wasShown = true;
-    } catch (const XrError& error) {
-      if (said != error.what()) spdlog::warn("{}", error.what());
-      said = error.what();
-      if (visit.frameTimes().summary(clothstream_now_us()).frames > 0) {
-        spdlog::warn("The OpenXR runtime is lost; a new session follows as soon as it answers");
-        lostUs = clothstream_now_us();
-        wasShown = true;
-      }
-    } catch (const std::runtime_error& error) {
+      if (!showUntilLost(options.headset, visit, sessions)) return 0;
+      error = "The OpenXR session is lost";
+    } catch (const XrError& lost) {
+      error = lost.what();
+    } catch (const std::runtime_error& lost) {
       // A device that has drawn frames may do so again; else something is missing.
-      if (visit.frameTimes().summary(clothstream_now_us()).frames == 0) throw;
-      spdlog::warn("{}; a new session follows", error.what());
-      wasShown = true;
+      if (visit.frameTimes().total() == framesBefore) throw;
+      error = lost.what();
     }
     const std::uint64_t nowUs = clothstream_now_us();
+    if (sessions > sessionsBefore) {
+      spdlog::warn("{}. A new session follows as soon as the OpenXR runtime answers", error);
+      lostUs = nowUs;
+      said.clear();
+    } else if (said != error) {
+      spdlog::warn("{}", error);
+      said = error;
+    }
     if (options.waitForRuntime >= 0 && static_cast<double>(nowUs - lostUs) > options.waitForRuntime * 1e6) {
       spdlog::error("No headset within {} s (--wait)", options.waitForRuntime);
       return 1;

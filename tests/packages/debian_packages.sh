@@ -25,7 +25,10 @@ echo "Packing"
 chmod -R a+rX "$work"
 mapfile -t packages < <(find "$work/apt/pool" -name '*.deb')
 ls -l "${packages[@]}"
-[ ${#packages[@]} -eq 4 ] || { echo "there should be four packages"; exit 1; }
+names="clothstream-client clothstream-server libclothstream libclothstream-dev"
+! grep -q '^CLOTHSTREAM_XR:BOOL=ON' "$build/CMakeCache.txt" || names="clothstream-client clothstream-server clothstream-xr libclothstream libclothstream-dev"
+[ "$(basename -a "${packages[@]}" | sed -E 's/_.*//; s/^(libclothstream)[0-9.]+$/\1/' | sort | xargs)" = "$names" ] ||
+  { echo "there should be the packages $names"; exit 1; }
 
 echo "Checking with lintian"
 lintian --fail-on error,warning --allow-root --tag-display-limit 0 "${packages[@]}"

@@ -66,6 +66,7 @@ TEST(XrFrameTimes, SumsUpTheLastSecond) {
   EXPECT_DOUBLE_EQ(summary.cpuMedianMs, 0.7);
   EXPECT_DOUBLE_EQ(summary.cpuMostMs, 5);
   EXPECT_EQ(times.summary(60'000'000).frames, 0U);
+  EXPECT_EQ(times.total(), 300U);
 }
 
 }  // namespace

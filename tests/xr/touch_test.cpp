@@ -69,7 +69,7 @@ TEST_F(XrTouch, ControllersAreSpheresAndHandsAreJoints) {
   EXPECT_FLOAT_EQ(input.hands[indexOf(Side::left)][3], 0.008f);
 }
 
-TEST_F(XrTouch, SqueezeNearTheClothNamesWhatWasSeenAndTurnsWithTheController) {
+TEST_F(XrTouch, SqueezeNamesSeenPlaceAndTurnsWithController) {
   giveController(right(), {0.1f, 1, 0.05f});
   right().squeeze = 1;
   frame();

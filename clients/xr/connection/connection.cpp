@@ -2,13 +2,21 @@
 #include "clients/xr/connection/connection.h"
 
 #include <array>
+#include <string_view>
 
 #include <spdlog/spdlog.h>
 
 namespace clothstream::xr {
 namespace {
 
+// Called by the threads of libclothstream. Attempts to reconnect repeat themselves ten times a second.
 void logLine(void*, std::uint32_t level, const char* text) {
+  static std::mutex mutex;
+  static std::string last;
+  const std::string_view line = text;
+  const std::lock_guard lock(mutex);
+  if (line == last || line.starts_with("reconnecting in")) return spdlog::debug("{}", line);
+  last = line;
   spdlog::log(level == CLOTHSTREAM_LOG_ERROR     ? spdlog::level::err
               : level == CLOTHSTREAM_LOG_WARNING ? spdlog::level::warn
                                                  : spdlog::level::info,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the user must know of the connection, and when to try again. No sockets, clocks or threads.
+// State of the connection for the user, and the time of the next attempt. No sockets, clocks or threads.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ enum class Phase : std::uint8_t {
   refused        // the server or the arguments do not allow it; a user must do something
 };
 
-// What failed: exchanging the pairing code, joining, or a stream that has run.
+// Step that failed: exchanging the pairing code, joining, or a stream that has run.
 enum class Step : std::uint8_t { pairing, joining, streaming };
 
 struct Trouble {

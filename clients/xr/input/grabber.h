@@ -36,7 +36,7 @@ class Grabber {
   // The grab for the present pose of the limb. What a limb holds turns with it. The result points at a member
   // of this object. Call only while it holds.
   cs_grab grab(const Limb& limb) const;
-  // What was seen and is held.
+  // Place that was seen and is held.
   const cs_cloth_point& place() const { return place_; }
 
  private:

@@ -45,7 +45,7 @@ void Limb::forget() {
   seen_ = isNew_ = false;
 }
 
-// What switches or is gone holds nothing.
+// A limb that switches or is gone holds nothing.
 void Limb::become(LimbKind kind) {
   if (kind == kind_) return;
   kind_ = kind;

@@ -31,7 +31,7 @@ class Limb {
   void forget();
 
   Side side() const { return side_; }
-  // What it is now, or was when it was lost.
+  // Present kind, or the last one before it was lost.
   LimbKind kind() const { return kind_; }
   bool present() const { return kind_ != LimbKind::none; }
   // Whether the headset showed it in the newest frame.
@@ -41,7 +41,7 @@ class Limb {
   const Pose& grip() const { return grip_; }
   bool hasRay() const { return hasRay_; }
   const Ray& ray() const { return ray_; }
-  // Of a hand.
+  // Joints of a hand.
   const HandJoints& joints() const { return joints_; }
 
   // Pressed: the hand pinches, or trigger or squeeze of the controller are down. `isNew` in the frame in

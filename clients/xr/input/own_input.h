@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a participant sends of its user: plain data in scene coordinates.
+// Input that a participant sends: plain data in scene coordinates.
 #pragma once
 
 #include <array>

@@ -10,8 +10,8 @@ namespace {
 constexpr float kAside = -0.6f, kHeight = 1.25f, kAhead = -0.3f;
 constexpr float kHalfHeight = 0.25f;
 constexpr float kEyes = 1.5f;
-// Place before the eyes.
-constexpr float kBefore = 0.7f, kBelowEyes = 0.1f;
+// Place of the upper edge before the eyes: nearer than the scene, which must not hide it.
+constexpr float kBefore = 0.45f, kAboveEyes = 0.1f;
 
 Eigen::Quaternionf turned(float yaw) {
   return Eigen::Quaternionf(Eigen::AngleAxisf(yaw, Eigen::Vector3f::UnitY()));
@@ -32,7 +32,7 @@ void PanelSeat::seat(const Pose& head) {
 void PanelSeat::comeBefore(const Pose& head) {
   const Eigen::Quaternionf yaw = turned(yawOf(head.orientation));
   const Eigen::Vector3f look = yaw * -Eigen::Vector3f::UnitZ();
-  pose_ = {head.position + kBefore * look + Eigen::Vector3f(0, kHalfHeight - kBelowEyes, 0), yaw};
+  pose_ = {head.position + kBefore * look + Eigen::Vector3f(0, kAboveEyes, 0), yaw};
 }
 
 }  // namespace clothstream::xr

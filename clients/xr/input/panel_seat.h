@@ -11,7 +11,7 @@ class PanelSeat {
   // The user was placed at this head pose: the panel stands to the left of the first look, nearer than the
   // scene, and faces the eyes.
   void seat(const Pose& head);
-  // What went wrong is shown in the direction of the look. It stays there until the user is seated again or
+  // Trouble is shown in the direction of the look. It stays there until the user is seated again or
   // comeBack().
   void comeBefore(const Pose& head);
   void comeBack() { pose_ = seat_; }

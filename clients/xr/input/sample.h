@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a headset says of its user at one display time.
+// Poses and buttons of the user of a headset at one display time.
 #pragma once
 
 #include <array>

@@ -27,7 +27,7 @@ class Touch {
   // Removes the user from the scene: the session is not visible.
   void leave();
 
-  // What to send. Pointers in it are valid until the next call of a function that is not const.
+  // Input to send. Pointers in it are valid until the next call of a function that is not const.
   OwnInput input() const;
 
   const Limb& limb(Side side) const { return limbs_[indexOf(side)]; }

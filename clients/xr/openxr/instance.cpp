@@ -36,7 +36,7 @@ XrDebugUtilsMessengerCreateInfoEXT messengerInfo() {
   return info;
 }
 
-// What a failed start means for the user.
+// Throws the meaning of a failed start for the user.
 [[noreturn]] void explain(XrResult result, const char* call) {
   const std::string name = nameOf(result);
   switch (result) {

@@ -7,7 +7,7 @@
 
 namespace clothstream::xr {
 
-// What the events since the last call ask for.
+// Changes that the events since the last call ask for.
 struct SessionChanges {
   bool restarts = false;         // instance or session are lost: make everything again
   bool exits = false;            // the user has closed the program

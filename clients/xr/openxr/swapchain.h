@@ -42,7 +42,7 @@ class Swapchain {
   std::uint32_t index_ = 0;
 };
 
-// First of the wanted formats that the runtime offers; VK_FORMAT_UNDEFINED if there is none.
+// First of the wanted formats that the runtime offers; VK_FORMAT_UNDEFINED without one.
 VkFormat chooseFormat(XrSession session, std::span<const VkFormat> wanted);
 
 }  // namespace clothstream::xr

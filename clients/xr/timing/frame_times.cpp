@@ -8,6 +8,7 @@ namespace clothstream::xr {
 void FrameTimes::add(std::uint64_t nowUs, std::uint64_t cpuUs) {
   frames_[next_] = {nowUs, cpuUs};
   next_ = (next_ + 1) % kFrames;
+  ++total_;
 }
 
 FrameTimes::Summary FrameTimes::summary(std::uint64_t nowUs) const {

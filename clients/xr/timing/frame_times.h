@@ -18,7 +18,9 @@ class FrameTimes {
 
   // A frame whose work took cpuUs on the thread that draws, and which ended at nowUs.
   void add(std::uint64_t nowUs, std::uint64_t cpuUs);
-  // Of the frames that ended in the second before nowUs.
+  // Number of all frames so far.
+  std::uint64_t total() const { return total_; }
+  // Sums up the frames that ended in the second before nowUs.
   Summary summary(std::uint64_t nowUs) const;
 
  private:
@@ -28,6 +30,7 @@ class FrameTimes {
   static constexpr std::size_t kFrames = 256;
   std::array<Frame, kFrames> frames_{};
   std::size_t next_ = 0;
+  std::uint64_t total_ = 0;
 };
 
 }  // namespace clothstream::xr

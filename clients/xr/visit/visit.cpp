@@ -76,7 +76,7 @@ void Visit::say(std::string text, std::uint64_t nowUs) {
   factsUs_ = 0;
 }
 
-// Puts scene and panel before a user who has just come, or whose scene has.
+// Puts scene and panel before the user in the first frame, and when a scene has arrived.
 void Visit::place(const InputSample& sample, const cs_client* client) {
   const bool hasScene = client && cs_vertex_count(client) > 0;
   if (!sample.hasHead || (isPlaced_ && (placedWithScene_ || !hasScene))) return;
