@@ -10,6 +10,7 @@
 
 #include "clients/xr/render/light.h"
 #include "clients/xr/stage/solids.h"
+#include "clients/xr/text/painter.h"
 #include "tests/xr/allocations.h"
 #include "tests/xr/drawn.h"
 #include "tests/xr/sample_stage.h"
