@@ -32,7 +32,7 @@ function(add test testLabels tests)
   string(REPLACE ";" ":" filter "${tests}")
   add_test(${test} ${program} --gtest_filter=${filter} --gtest_brief=1)
   set(timeout 900)
-  if("long" IN_LIST testLabels)
+  if(testLabels MATCHES "(^|;)long(;|$)")
     set(timeout 3600)
   endif()
   set_tests_properties(${test} PROPERTIES LABELS "${testLabels}" ENVIRONMENT "${environment}" TIMEOUT ${timeout}
