@@ -20,11 +20,11 @@ std::vector<char32_t> charactersOf(std::string_view text) {
   return characters;
 }
 
-TEST(Utf8, ReadsCharactersOfAllLengths) {
+TEST(XrUtf8, ReadsCharactersOfAllLengths) {
   EXPECT_THAT(charactersOf("a\u00e9\u20ac\U0001F600"), ElementsAre(U'a', U'\u00e9', U'\u20ac', U'\U0001F600'));
 }
 
-TEST(Utf8, ReplacesEachMalformedByte) {
+TEST(XrUtf8, ReplacesEachMalformedByte) {
   EXPECT_THAT(charactersOf("\xff"), ElementsAre(0xFFFD));                         // no start of a character
   EXPECT_THAT(charactersOf("\xe2\x82"), ElementsAre(0xFFFD, 0xFFFD));             // cut off
   EXPECT_THAT(charactersOf("\xc0\xaf"), ElementsAre(0xFFFD, 0xFFFD));             // overlong
