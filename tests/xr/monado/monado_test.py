@@ -23,6 +23,7 @@ from monado import Root  # noqa: E402
 from remote import Remote, turned  # noqa: E402
 from programs import Server, wait_until  # noqa: E402
 
+GRAB_TAKEN = 1  # cs_grab_event_kind
 RADIUS = 0.045  # of the sphere of a controller, m
 # The largest depth of a vertex in a collider that is no penetration: rounding of positions in the stream.
 ROUNDING = 0.002
@@ -206,8 +207,12 @@ class Touching(WithMonado):
         touched = np.linalg.norm(frame.positions - sphere, axis=1) < RADIUS + 0.05
         self.remote.right.squeeze = 1.0
         self.remote.send()
+        taken = lambda: observer.next_frame() and any(
+            each.participant_id == visor and each.kind == GRAB_TAKEN and each.vertices > 0 for each in observer.grab_events
+        )
+        wait_until(taken, "the grab")
         self.look("grabbed")
-        self.carry(observer, visor, to_scene, (0.05, 1.6, 0.3), step=0.04)
+        self.carry(observer, visor, to_scene, (0.05, 1.6, 0.3))
         frame = settle(observer, 60)
         sphere = self.nearest(frame, visor, (0.05, 1.6, 0.3))
         held = np.linalg.norm(frame.positions[touched] - sphere, axis=1).min()
