@@ -77,7 +77,7 @@ TEST_F(PanelTest, HitHasTheDistanceAlongTheRay) {
   EXPECT_NEAR(at->place.y(), 0.1f, 1e-5f);
 }
 
-TEST_F(PanelTest, RaysMissBesideBehindAndAwayFromThePanel) {
+TEST_F(PanelTest, RaysFromBehindAndOutsideMiss) {
   const Eigen::Vector3f back = pose_.orientation * Eigen::Vector3f::UnitZ();
   const auto hitAt = [&](float x, float y, float z, const Eigen::Vector3f& direction) {
     return panel_.hit(pose_, pose_.apply({x, y, z}), direction).has_value();

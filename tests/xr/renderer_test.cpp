@@ -317,7 +317,7 @@ TEST_F(RendererTest, NormalsOfTheStreamReplaceComputedOnes) {
   EXPECT_LT(drawn.at(32, 32).brightness(), computed - 40);
 }
 
-TEST_F(RendererTest, ANewTopologyReplacesTheOldOne) {
+TEST_F(RendererTest, NewTopologyReplacesTheFormer) {
   Drawn drawn(device(), 64, 1);
   const Stage small = sampleStage(4);
   Stage large = sampleStage(60);
