@@ -147,7 +147,12 @@ TEST_F(ScenePictureTest, OthersHaveHeadHandAndName) {
   });
   ASSERT_TRUE(spectator.readUntil([](const Stage& stage) { return !stage.labels.empty(); }));
   const Stage& stage = spectator.stage();
-  EXPECT_LT((stage.labels[0].position - Eigen::Vector3f(0.4f, 1.97f, 1.2f)).norm(), 1e-3f);
+  // The name is 16 cm above the head.
+  const auto head = std::ranges::find_if(stage.solids, [](const Solid& solid) {
+    return (solid.pose.position - Eigen::Vector3f(0.4f, 1.7f, 1.2f)).norm() < 1e-3f;
+  });
+  ASSERT_NE(head, stage.solids.end());
+  EXPECT_NEAR(stage.labels[0].position.y(), 1.7f + head->radius + 0.16f, 1e-3f);
   EXPECT_EQ(stage.labels[0].picture->width, painter_.label("Ada", {})->width);
   // Head, visor and ball have the colour of the participant, except for the visor.
   const Colour colour = colourOf(stage.labels[0].id);
