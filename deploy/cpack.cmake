@@ -52,7 +52,8 @@ that read recordings in tests of other programs, and the packages for npm and
 Unity.")
 if(CLOTHSTREAM_XR)
   list(APPEND CPACK_COMPONENTS_ALL xr xr_system)
-  clothstream_package(xr_group clothstream-xr net "mesa-vulkan-drivers | vulkan-icd, fonts-dejavu-core" ""
+  clothstream_package(xr_group clothstream-xr net
+    "libclothstream${CLOTHSTREAM_SOVERSION} (= ${version}), libvulkan1, mesa-vulkan-drivers | vulkan-icd, fonts-dejavu-core" ""
     "client for cloth streams in OpenXR headsets"
     "The command clothstream-xr shows scenes of a ClothStream server in a headset
 with an OpenXR runtime, such as SteamVR, Monado or WiVRn. Hands and controllers

@@ -32,12 +32,18 @@ void* operator new(std::size_t size) {
   if (memory == nullptr) throw std::bad_alloc();
   return memory;
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
 
 namespace clothstream::xr::tests {
 
 Allocations::Allocations() : before_(allocations) {}
-std::size_t Allocations::count() const { return allocations - before_; }
+std::size_t Allocations::count() const {
+  return allocations - before_;
+}
 
 }  // namespace clothstream::xr::tests

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Counts the allocations of one thread of the test program. Those of libraries with their own functions, such as a
-// graphics driver in C, are not counted.
+// Counts the allocations of one thread of the test program. Those of libraries with their own functions, such
+// as a graphics driver in C, are not counted.
 #pragma once
 
 #include <cstddef>

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -16,21 +17,26 @@
 
 namespace clothstream::xr::tests {
 
-// The device of this process, made once; null where there is no Vulkan device. `why` says why then.
-inline OwnDevice* device(std::string& why) {
-  static std::string reason;
-  static const std::unique_ptr<OwnDevice> made = []() -> std::unique_ptr<OwnDevice> {
+// A Vulkan device for a test, if there is one.
+class Device {
+ public:
+  Device() {
     try {
       openVulkanLoader();
-      return std::make_unique<OwnDevice>(std::span<const char* const>(), std::span<const char* const>());
+      device_ = std::make_unique<OwnDevice>(std::span<const char* const>(), std::span<const char* const>());
     } catch (const std::runtime_error& error) {
-      reason = error.what();
-      return nullptr;
+      why_ = error.what();
     }
-  }();
-  why = reason;
-  return made.get();
-}
+  }
+  // Null without a device; why() says why then.
+  const OwnDevice* get() const { return device_.get(); }
+  const std::string& why() const { return why_; }
+  const GraphicsDevice& graphics() const { return device_->get(); }
+
+ private:
+  std::unique_ptr<OwnDevice> device_;
+  std::string why_;
+};
 
 // Camera at `eye` that looks at `at`, with the same tangent to all four sides.
 inline View look(const Eigen::Vector3f& eye, const Eigen::Vector3f& at, float tangent = 0.5f) {
@@ -51,20 +57,22 @@ class Drawn {
  public:
   Drawn(const GraphicsDevice& device, std::uint32_t size, std::uint32_t views, std::uint32_t samples = 1)
       : target_(device, {size, size}, views, true),
-        renderer_(device, {.samples = samplesOf(device.physical, samples), .views = views, .largest = {size, size}}),
+        renderer_(device,
+                  {.samples = samplesOf(device.physical, samples), .views = views, .largest = {size, size}}),
         commands_(device) {}
 
   // Draws the stage and waits for the picture.
   void draw(const Stage& stage, std::span<const View> views) {
-    record(stage, views);
+    record(stage, views, true);
     commands_.finish();
   }
-  void record(const Stage& stage, std::span<const View> views) {
+  // Draws without waiting; with `reads`, pixels can be read when the frame is complete.
+  void record(const Stage& stage, std::span<const View> views, bool reads = false) {
     if (stage.topology != uploaded_) renderer_.upload(stage);
     uploaded_ = stage.topology;
     const VkCommandBuffer commands = commands_.begin();
     renderer_.record(commands, target_.target(), views, stage);
-    target_.recordRead(commands);
+    if (reads) target_.recordRead(commands);
     commands_.submit();
   }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
+#include "clients/xr/panel/panel.h"
+
 #include <algorithm>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include "clients/xr/panel/panel.h"
 
 namespace clothstream::xr {
 namespace {
@@ -49,7 +49,8 @@ class PanelTest : public testing::Test {
     return panel_.point(0, at, false);
   }
   bool shows(const std::string& text) const {
-    return std::ranges::any_of(panel_.lines(), [&](const PanelLine& line) { return line.text.find(text) != line.text.npos; });
+    return std::ranges::any_of(panel_.lines(),
+                               [&](const PanelLine& line) { return line.text.find(text) != line.text.npos; });
   }
 
   TextPainter painter_;
@@ -76,7 +77,7 @@ TEST_F(PanelTest, HitHasTheDistanceAlongTheRay) {
   EXPECT_NEAR(at->place.y(), 0.1f, 1e-5f);
 }
 
-TEST_F(PanelTest, RaysMissBesideBehindAndAwayFromThePanel) {
+TEST_F(PanelTest, RaysFromBehindAndOutsideMiss) {
   const Eigen::Vector3f back = pose_.orientation * Eigen::Vector3f::UnitZ();
   const auto hitAt = [&](float x, float y, float z, const Eigen::Vector3f& direction) {
     return panel_.hit(pose_, pose_.apply({x, y, z}), direction).has_value();
@@ -178,7 +179,8 @@ TEST_F(PanelTest, EverythingIsWithinThePanel) {
       EXPECT_LE(area.left + area.width, kPanelWidth);
       EXPECT_LE(area.top + area.height, panel_.height());
     }
-    for (const PanelLine& line : panel_.lines()) EXPECT_LE(line.top + kPanelRow, kPanelHeight + 1e-4f) << line.text;
+    for (const PanelLine& line : panel_.lines())
+      EXPECT_LE(line.top + kPanelRow, kPanelHeight + 1e-4f) << line.text;
   }
 }
 
@@ -210,7 +212,7 @@ TEST_F(PanelTest, PictureChangesOnlyWithWhatItShows) {
   panel_.show(facts);
   panel_.finish();
   EXPECT_NE(panel_.quad(pose_).picture->revision, revision);
-  panel_.point(0, hit(*find("Reset")), false); // hovers
+  panel_.point(0, hit(*find("Reset")), false);  // hovers
   panel_.finish();
   EXPECT_NE(panel_.quad(pose_).picture->revision, revision + 1);
 }

@@ -71,8 +71,13 @@ TEST(Topology, ShapesFollowEachOther) {
   const std::vector<float> positions{0, 0, 0, 1, 0, 0, 0, 1, 0};
   stage.positions.insert(stage.positions.end(), positions.begin(), positions.end());
   const std::vector<std::uint32_t> corners{9, 10, 11};
-  EXPECT_FALSE(append(
-      {.firstNode = 9, .nodeCount = 3, .positions = positions, .corners = corners, .uvs = {}, .uvIndices = {}}, stage));
+  EXPECT_FALSE(append({.firstNode = 9,
+                       .nodeCount = 3,
+                       .positions = positions,
+                       .corners = corners,
+                       .uvs = {},
+                       .uvIndices = {}},
+                      stage));
   EXPECT_EQ(stage.nodeCount, 12U);
   EXPECT_EQ(stage.fanStarts.size(), 13U);
   EXPECT_EQ(stage.fans.size(), faces + 3);
@@ -89,10 +94,10 @@ TEST(Fabrics, UnknownMaterialsLookLikeCotton) {
 TEST(Solids, HeadWithKnownOrientationHasAVisor) {
   cs_collider head;
   head.shape = CS_SHAPE_SPHERE;
-  head.name = "2147483712"; // CS_HEAD_ID
+  head.name = "2147483712";  // CS_HEAD_ID
   head.participant_id = 7;
   head.radius = 0.11f;
-  const std::array<float, 4> turned{0, 0.7071068f, 0, 0.7071068f}; // looks along -X
+  const std::array<float, 4> turned{0, 0.7071068f, 0, 0.7071068f};  // looks along -X
   std::ranges::copy(turned, head.orientation);
   ASSERT_TRUE(isHead(head));
   std::vector<Solid> solids;

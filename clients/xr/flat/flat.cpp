@@ -26,14 +26,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr float kNear = 0.05F, kFar = 100; // m
+constexpr float kNear = 0.05F, kFar = 100;  // m
 constexpr auto kFrameTime = std::chrono::microseconds(16'667);
 // Longest time to wait for the scene before a picture is made without it.
 constexpr auto kLongestWait = std::chrono::seconds(15);
 // Time that the scene is shown before the first picture, so that the panel has everything.
 constexpr auto kSettles = std::chrono::seconds(1);
-constexpr std::size_t kWarmUp = 10; // frames whose cost is not counted
-// Place of the panel's upper edge before the camera, m: in the left upper corner, or in the middle for trouble.
+constexpr std::size_t kWarmUp = 10;  // frames whose cost is not counted
+// Place of the panel's upper edge before the camera, m: in the left upper corner, or in the middle for
+// trouble.
 constexpr float kPanelAway = 1.5F, kPanelEdge = 0.03F;
 // A mouse is a controller behind the camera, where it touches no cloth.
 const Eigen::Vector3f kGripPlace(0, -0.3F, 0.5F);
@@ -92,7 +93,7 @@ struct Flat::Parts {
 
   FlatOptions options;
   Visit& visit;
-  std::unique_ptr<Window> window; // null: pictures
+  std::unique_ptr<Window> window;  // null: pictures
   std::unique_ptr<OwnDevice> device;
   std::unique_ptr<Offscreen> offscreen;
   std::unique_ptr<Renderer> renderer;
@@ -130,8 +131,8 @@ Flat::Parts::Parts(const FlatOptions& flatOptions, Visit& shown) : options(flatO
     std::error_code error;
     std::filesystem::create_directories(options.pictures, error);
     if (error)
-      throw std::runtime_error(fmt::format("--pictures: the folder {} cannot be made: {}", options.pictures,
-                                           error.message()));
+      throw std::runtime_error(
+          fmt::format("--pictures: the folder {} cannot be made: {}", options.pictures, error.message()));
     device = std::make_unique<OwnDevice>(std::span<const char* const>(), std::span<const char* const>());
     offscreen = std::make_unique<Offscreen>(device->get(), size, 1);
     makeRenderer(VK_FORMAT_R8G8B8A8_SRGB, size);
@@ -208,8 +209,8 @@ void Flat::Parts::makeStage(float aspect) {
 
 // Whether a picture shows what it should: the scene, or what is in its way.
 bool Flat::Parts::isReady() const {
-  const bool hasScene = visit.stage().topology != 0 && visit.connection().phase() == Phase::live && aimedAt != 0 &&
-                        Clock::now() - shownSince > kSettles;
+  const bool hasScene = visit.stage().topology != 0 && visit.connection().phase() == Phase::live &&
+                        aimedAt != 0 && Clock::now() - shownSince > kSettles;
   return hasScene || visit.connection().phase() == Phase::refused || Clock::now() - start > kLongestWait;
 }
 
@@ -285,7 +286,9 @@ bool Flat::Parts::stepPictures() {
 Flat::Flat(const FlatOptions& options, Visit& visit) : parts_(std::make_unique<Parts>(options, visit)) {}
 Flat::~Flat() = default;
 
-bool Flat::step() { return parts_->window ? parts_->stepWindow() : parts_->stepPictures(); }
+bool Flat::step() {
+  return parts_->window ? parts_->stepWindow() : parts_->stepPictures();
+}
 
 std::string Flat::summary() const {
   const Costs& costs = parts_->costs;
@@ -293,8 +296,8 @@ std::string Flat::summary() const {
   return fmt::format(
       "{} frames of {} vertices. Processor time of a frame: median {:.3f} ms (stage {:.3f}, drawing {:.3f}), "
       "99 % below {:.3f} ms",
-      parts_->frames, parts_->visit.stage().clothNodeCount, Costs::median(costs.whole), Costs::median(costs.stage),
-      Costs::median(costs.drawing), Costs::percentile99(costs.whole));
+      parts_->frames, parts_->visit.stage().clothNodeCount, Costs::median(costs.whole),
+      Costs::median(costs.stage), Costs::median(costs.drawing), Costs::percentile99(costs.whole));
 }
 
 }  // namespace clothstream::xr

@@ -11,13 +11,13 @@
 namespace clothstream::xr {
 
 struct FlatOptions {
-  // Folder for PNG files, flat_0001.png and so on; it is made if it does not exist. "": a window, or the present folder
-  // if there is no display.
+  // Folder for PNG files, flat_0001.png and so on; it is made if it does not exist. "": a window, or the
+  // present folder if there is no display.
   std::string pictures;
-  std::uint32_t frames = 0;            // frames to draw; 0: a window until it is closed, or one picture
-  std::uint32_t every = 1;             // of the frames, each n-th is written to a file
+  std::uint32_t frames = 0;  // frames to draw; 0: a window until it is closed, or one picture
+  std::uint32_t every = 1;   // of the frames, each n-th is written to a file
   std::uint32_t width = 1280, height = 800;
-  std::uint32_t samples = 4;           // per pixel: 1, 2, 4 or 8
+  std::uint32_t samples = 4;  // per pixel: 1, 2, 4 or 8
   bool showsPanel = true;
 };
 
@@ -29,8 +29,9 @@ class Flat {
   Flat(const Flat&) = delete;
   Flat& operator=(const Flat&) = delete;
 
-  // One displayed frame; it takes as long as a frame of the display, or 1/60 s. Returns false when all frames are drawn,
-  // the window is closed, or the user has left. Throws std::runtime_error if a file cannot be written.
+  // One displayed frame; it takes as long as a frame of the display, or 1/60 s. Returns false when all frames
+  // are drawn, the window is closed, or the user has left. Throws std::runtime_error if a file cannot be
+  // written.
   bool step();
   // The costs of the frames so far, as a sentence.
   std::string summary() const;

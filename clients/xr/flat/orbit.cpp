@@ -8,7 +8,7 @@ namespace clothstream::xr {
 namespace {
 
 constexpr float kFirstYaw = 0.35F, kFirstPitch = 0.16F;
-constexpr float kTurn = 3.2F; // radians for a way as long as the picture is high
+constexpr float kTurn = 3.2F;  // radians for a way as long as the picture is high
 constexpr float kZoom = 0.88F;
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace clothstream::xr {
 namespace {
 
-float scrolled = 0; // since the last poll; GLFW calls back on the thread that polls
+float scrolled = 0;  // since the last poll; GLFW calls back on the thread that polls
 
 std::string glfwError() {
   const char* text = nullptr;
@@ -45,10 +45,11 @@ std::vector<const char*> Window::instanceExtensions() {
 
 Window::Window(const std::string& title, VkExtent2D size) {
   glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
-  window_ = glfwCreateWindow(static_cast<int>(size.width), static_cast<int>(size.height), title.c_str(), nullptr,
-                             nullptr);
+  window_ = glfwCreateWindow(static_cast<int>(size.width), static_cast<int>(size.height), title.c_str(),
+                             nullptr, nullptr);
   if (window_ == nullptr) throw std::runtime_error("GLFW cannot open a window: " + glfwError());
-  glfwSetScrollCallback(window_, [](GLFWwindow*, double, double steps) { scrolled += static_cast<float>(steps); });
+  glfwSetScrollCallback(window_,
+                        [](GLFWwindow*, double, double steps) { scrolled += static_cast<float>(steps); });
 }
 
 Window::~Window() {
@@ -63,19 +64,22 @@ void Window::open(const GraphicsDevice& device) {
   VkBool32 isSupported = VK_FALSE;
   check(vkGetPhysicalDeviceSurfaceSupportKHR(device.physical, device.queueFamily, surface_, &isSupported),
         "vkGetPhysicalDeviceSurfaceSupportKHR");
-  if (isSupported == VK_FALSE) throw std::runtime_error("the graphics device cannot show pictures in this window");
+  if (isSupported == VK_FALSE)
+    throw std::runtime_error("the graphics device cannot show pictures in this window");
   std::uint32_t count = 0;
   check(vkGetPhysicalDeviceSurfaceFormatsKHR(device.physical, surface_, &count, nullptr), "surface formats");
   std::vector<VkSurfaceFormatKHR> formats(count);
-  check(vkGetPhysicalDeviceSurfaceFormatsKHR(device.physical, surface_, &count, formats.data()), "surface formats");
-  for (const VkFormat wanted : {VK_FORMAT_B8G8R8A8_SRGB, VK_FORMAT_R8G8B8A8_SRGB, VK_FORMAT_B8G8R8A8_UNORM,
-                                VK_FORMAT_R8G8B8A8_UNORM})
+  check(vkGetPhysicalDeviceSurfaceFormatsKHR(device.physical, surface_, &count, formats.data()),
+        "surface formats");
+  for (const VkFormat wanted :
+       {VK_FORMAT_B8G8R8A8_SRGB, VK_FORMAT_R8G8B8A8_SRGB, VK_FORMAT_B8G8R8A8_UNORM, VK_FORMAT_R8G8B8A8_UNORM})
     for (const VkSurfaceFormatKHR& offered : formats)
       if (format_ == VK_FORMAT_UNDEFINED && offered.format == wanted) {
         format_ = wanted;
         space_ = offered.colorSpace;
       }
-  if (format_ == VK_FORMAT_UNDEFINED) throw std::runtime_error("the window has no format with 8 bits per colour");
+  if (format_ == VK_FORMAT_UNDEFINED)
+    throw std::runtime_error("the window has no format with 8 bits per colour");
   for (std::uint32_t i = 0; i < kFramesInFlight; ++i) available_.push_back(semaphore(device.device));
   // The window can grow to the size of the largest screen without a new renderer.
   int monitors = 0;
@@ -136,7 +140,8 @@ void Window::makeSwapchain() {
   std::uint32_t count = 0;
   check(vkGetSwapchainImagesKHR(device_.device, swapchain, &count, nullptr), "vkGetSwapchainImagesKHR");
   images_.resize(count);
-  check(vkGetSwapchainImagesKHR(device_.device, swapchain, &count, images_.data()), "vkGetSwapchainImagesKHR");
+  check(vkGetSwapchainImagesKHR(device_.device, swapchain, &count, images_.data()),
+        "vkGetSwapchainImagesKHR");
   drawn_.clear();
   for (VkImage image : images_) {
     VkImageViewCreateInfo viewInfo{};
@@ -188,7 +193,7 @@ Target Window::acquire(std::size_t frame, bool& forgets) {
   for (int attempt = 0; attempt < 2; ++attempt) {
     if (isStale_) remake(forgets);
     if (size_.width == 0 || size_.height == 0) {
-      isStale_ = true; // minimised: look again in the next frame
+      isStale_ = true;  // minimised: look again in the next frame
       return {};
     }
     const VkResult result = vkAcquireNextImageKHR(device_.device, swapchain_.get(), UINT64_MAX,
@@ -212,8 +217,8 @@ void Window::recordPresent(VkCommandBuffer commands) const {
   change.srcQueueFamilyIndex = change.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
   change.image = images_[image_];
   change.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, 0,
-                       0, nullptr, 0, nullptr, 1, &change);
+  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT,
+                       VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, 0, 0, nullptr, 0, nullptr, 1, &change);
 }
 
 void Window::present() {

@@ -2,12 +2,11 @@
 // A window of GLFW with a swapchain, and its mouse.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "clients/xr/render/handle.h"
 #include "clients/xr/render/renderer.h"
@@ -18,11 +17,12 @@ namespace clothstream::xr {
 
 // What the user has done since the last call of Window::poll().
 struct MouseInput {
-  Eigen::Vector2f place = Eigen::Vector2f::Zero(); // in the window: -1 to 1, to the right and up
-  Eigen::Vector2f moved = Eigen::Vector2f::Zero(); // as parts of the height of the window, to the right and up
-  float scrolled = 0;                              // steps, away from the user
+  Eigen::Vector2f place = Eigen::Vector2f::Zero();  // in the window: -1 to 1, to the right and up
+  Eigen::Vector2f moved =
+      Eigen::Vector2f::Zero();  // as parts of the height of the window, to the right and up
+  float scrolled = 0;           // steps, away from the user
   bool left = false, right = false, middle = false;
-  bool resets = false; // a key asks for the first view
+  bool resets = false;  // a key asks for the first view
 };
 
 class Window {
@@ -45,8 +45,8 @@ class Window {
 
   // Reads the mouse. Returns false if the window is to be closed.
   bool poll(MouseInput& input);
-  // Next image to draw to; its size is 0 while the window is minimised. Waits for the display. `forgets` is set when the
-  // image views of earlier targets are gone.
+  // Next image to draw to; its size is 0 while the window is minimised. Waits for the display. `forgets` is
+  // set when the image views of earlier targets are gone.
   Target acquire(std::size_t frame, bool& forgets);
   VkSemaphore available(std::size_t frame) const { return available_[frame].get(); }
   VkSemaphore drawn() const { return drawn_[image_].get(); }
@@ -67,7 +67,7 @@ class Window {
   Owned<VkSwapchainKHR> swapchain_;
   std::vector<VkImage> images_;
   std::vector<Owned<VkImageView>> views_;
-  std::vector<Owned<VkSemaphore>> available_, drawn_; // per frame in flight; per image
+  std::vector<Owned<VkSemaphore>> available_, drawn_;  // per frame in flight; per image
   std::uint32_t image_ = 0;
   bool isStale_ = false;
   Eigen::Vector2f cursor_ = Eigen::Vector2f::Zero();

@@ -10,9 +10,9 @@ namespace clothstream::xr {
 namespace {
 
 constexpr float kInner = kPanelWidth - 2 * kPanelMargin;
-constexpr float kLabelPart = 0.26F;  // of the width, for a text on the left of buttons
-constexpr float kPokeDepth = 0.03F;  // m behind the panel at which a finger no longer presses
-constexpr std::size_t kListRows = 7; // of one page
+constexpr float kLabelPart = 0.26F;   // of the width, for a text on the left of buttons
+constexpr float kPokeDepth = 0.03F;   // m behind the panel at which a finger no longer presses
+constexpr std::size_t kListRows = 7;  // of one page
 constexpr std::size_t kFigureRows = 10;
 
 constexpr std::array<const char*, 4> kTabs{"Scenes", "People", "Quality", "Figures"};
@@ -23,10 +23,14 @@ std::string spaced(std::string name) {
   return name;
 }
 
-Eigen::Vector3f toPanel(const Pose& pose, const Eigen::Vector3f& point) { return inverse(pose).apply(point); }
+Eigen::Vector3f toPanel(const Pose& pose, const Eigen::Vector3f& point) {
+  return inverse(pose).apply(point);
+}
 
 // Place on the panel, from its upper left corner, of a point in its frame.
-Eigen::Vector2f placeOf(const Eigen::Vector3f& local) { return {local.x() + kPanelWidth / 2, -local.y()}; }
+Eigen::Vector2f placeOf(const Eigen::Vector3f& local) {
+  return {local.x() + kPanelWidth / 2, -local.y()};
+}
 
 }  // namespace
 
@@ -99,7 +103,8 @@ void Panel::layOutTab(float& top) {
                         .effect = {.action = PanelAction{pause}}}});
       for (const PanelFacts::Scene& scene : facts_.scenes)
         items.push_back({.text = spaced(scene.name),
-                         .detail = fmt::format("{} {}", scene.participants, scene.participants == 1 ? "person" : "people"),
+                         .detail = fmt::format("{} {}", scene.participants,
+                                               scene.participants == 1 ? "person" : "people"),
                          .isChosen = scene.name == facts_.scene,
                          .effect = {.action = PanelAction{PanelActionKind::kJoinScene, scene.name}}});
       addList(top, kListRows, items, true);
@@ -107,7 +112,8 @@ void Panel::layOutTab(float& top) {
     }
     case PanelTab::kPeople:
       for (const PanelFacts::Person& person : facts_.people)
-        items.push_back({.text = person.isSelf ? person.name + " (you)" : person.name, .detail = person.detail});
+        items.push_back(
+            {.text = person.isSelf ? person.name + " (you)" : person.name, .detail = person.detail});
       addList(top, kListRows + 1, items, false);
       break;
     case PanelTab::kQuality:
@@ -139,7 +145,7 @@ void Panel::layOutTab(float& top) {
 void Panel::addText(float& top, const std::string& text, std::size_t most, bool isStrong) {
   if (most == 0) return;
   const float pixels = (isStrong ? kTitleSize : kTextSize) * kPanelRow * kPanelPixelsPerMetre;
-  const float room = kInner * kPanelPixelsPerMetre * (isStrong ? 0.94F : 1); // bold letters are wider
+  const float room = kInner * kPanelPixelsPerMetre * (isStrong ? 0.94F : 1);  // bold letters are wider
   const std::vector<std::string> lines = painter_.wrap(text, pixels, room, most);
   for (std::size_t i = 0; i < lines.size(); ++i)
     drawn_.lines.push_back({top + static_cast<float>(i) * kPanelRow * kLineHeight, lines[i], "", isStrong});
@@ -191,7 +197,8 @@ std::optional<PanelHit> Panel::hit(const Pose& pose, const Eigen::Vector3f& orig
   if (from.z() <= 0 || along.z() >= 0) return std::nullopt;
   const float distance = -from.z() / along.z();
   const Eigen::Vector2f place = placeOf(from + distance * along);
-  if (place.x() < 0 || place.x() > kPanelWidth || place.y() < 0 || place.y() > drawn_.height) return std::nullopt;
+  if (place.x() < 0 || place.x() > kPanelWidth || place.y() < 0 || place.y() > drawn_.height)
+    return std::nullopt;
   return PanelHit{place, distance, buttonAt(place)};
 }
 
@@ -205,7 +212,8 @@ int Panel::buttonAt(const Eigen::Vector2f& place) const {
   return -1;
 }
 
-std::optional<PanelAction> Panel::point(std::size_t pointer, const std::optional<PanelHit>& hit, bool pressed) {
+std::optional<PanelAction> Panel::point(std::size_t pointer, const std::optional<PanelHit>& hit,
+                                        bool pressed) {
   // The hit can be older than the layout.
   const int button = hit ? buttonAt(hit->place) : -1;
   if (drawn_.hovered[pointer] != button) {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The panel in space: scenes, people, quality and figures under tabs, buttons, and what has gone wrong. It knows
-// nothing of OpenXR, Vulkan or libclothstream.
+// The panel in space: scenes, people, quality and figures under tabs, buttons, and what has gone wrong. It
+// knows nothing of OpenXR, Vulkan or libclothstream.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "clients/xr/panel/panel_drawing.h"
 #include "clients/xr/stage/stage.h"
@@ -26,7 +25,7 @@ struct PanelFacts {
   };
   struct Person {
     std::string name;
-    std::string detail; // role, or "away"
+    std::string detail;  // role, or "away"
     bool isSelf = false;
     bool operator==(const Person&) const = default;
   };
@@ -36,19 +35,19 @@ struct PanelFacts {
     bool operator==(const Figure&) const = default;
   };
 
-  std::string title = "ClothStream"; // first line
-  std::string scene;                 // the joined one; "" if none
+  std::string title = "ClothStream";  // first line
+  std::string scene;                  // the joined one; "" if none
   std::vector<Scene> scenes;
   std::vector<Person> people;
   std::vector<Figure> figures;
-  std::uint32_t quality = 0;       // limit of this client, 0 (finest) to 3
-  bool mayAct = false;             // Reset and Pause are enabled
+  std::uint32_t quality = 0;  // limit of this client, 0 (finest) to 3
+  bool mayAct = false;        // Reset and Pause are enabled
   bool isPaused = false;
-  bool canRecenter = true;         // else the button is left out (flat)
+  bool canRecenter = true;  // else the button is left out (flat)
   // What happened, and what to do; "" if all is well. They stand in front of everything else.
   std::string trouble, advice;
-  bool canRetry = false;           // adds a button "Try again" to the trouble
-  std::string status;              // last line: a notice, or figures in short
+  bool canRetry = false;  // adds a button "Try again" to the trouble
+  std::string status;     // last line: a notice, or figures in short
   bool operator==(const PanelFacts&) const = default;
 };
 
@@ -57,15 +56,15 @@ enum class PanelActionKind { kJoinScene, kReset, kPause, kContinue, kQuality, kR
 // What a press asks the program to do.
 struct PanelAction {
   PanelActionKind kind = PanelActionKind::kReset;
-  std::string scene{};       // kJoinScene
-  std::uint32_t quality = 0; // kQuality
+  std::string scene{};        // kJoinScene
+  std::uint32_t quality = 0;  // kQuality
   bool operator==(const PanelAction&) const = default;
 };
 
 struct PanelHit {
-  Eigen::Vector2f place = Eigen::Vector2f::Zero(); // m from the upper left corner, to the right and down
-  float distance = 0;                              // along the ray, m
-  int button = -1;                                 // index, or -1 if there is none at the place
+  Eigen::Vector2f place = Eigen::Vector2f::Zero();  // m from the upper left corner, to the right and down
+  float distance = 0;                               // along the ray, m
+  int button = -1;                                  // index, or -1 if there is none at the place
 };
 
 enum class PanelTab : std::uint32_t { kScenes = 0, kPeople = 1, kQuality = 2, kFigures = 3 };
@@ -78,25 +77,29 @@ class Panel {
 
   // Shows the facts. Lays out and draws only if they have changed.
   void show(const PanelFacts& facts);
-  // The quad for a stage, with the middle of its upper edge at the pose. Its picture is the newest that is drawn, and
-  // valid until the next call.
+  // The quad for a stage, with the middle of its upper edge at the pose. Its picture is the newest that is
+  // drawn, and valid until the next call.
   PanelQuad quad(const Pose& pose);
   // Waits until the picture of quad() has everything.
   void finish() { drawing_.finish(); }
   // Height of what is drawn, m. It depends on the facts; the quad is as high as the panel can be.
   float height() const { return drawn_.height; }
 
-  // Where a ray meets the front of the panel, whose upper edge's middle is at `pose`. The direction has length 1.
-  std::optional<PanelHit> hit(const Pose& pose, const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
+  // Where a ray meets the front of the panel, whose upper edge's middle is at `pose`. The direction has
+  // length 1.
+  std::optional<PanelHit> hit(const Pose& pose, const Eigen::Vector3f& origin,
+                              const Eigen::Vector3f& direction) const;
 
   // Pointers that can hover and press at the same time: hands, controllers or a mouse.
   static constexpr std::size_t kPointers = 2;
-  // A pointer is at `hit` (none: not on the panel). `pressed` is the state of its button. A press that begins on a button
-  // and ends on the same button acts. Returns what it asks for; tabs and pages act within the panel.
+  // A pointer is at `hit` (none: not on the panel). `pressed` is the state of its button. A press that begins
+  // on a button and ends on the same button acts. Returns what it asks for; tabs and pages act within the
+  // panel.
   std::optional<PanelAction> point(std::size_t pointer, const std::optional<PanelHit>& hit, bool pressed);
   // A finger tip at `tip`. Going through a button from the front acts at once. Returns what it asks for.
   std::optional<PanelAction> poke(std::size_t pointer, const Pose& pose, const Eigen::Vector3f& tip);
-  // Whether a press of this pointer began on the panel and has not ended; the program does not grab cloth then.
+  // Whether a press of this pointer began on the panel and has not ended; the program does not grab cloth
+  // then.
   bool isHeld(std::size_t pointer) const { return presses_[pointer].has_value(); }
 
   // What is shown: lines of text, and buttons.
@@ -133,9 +136,9 @@ class Panel {
   PanelTab tab_ = PanelTab::kScenes;
   std::uint32_t page_ = 0;
   PanelDrawing drawn_;
-  std::vector<Effect> effects_; // of each button
+  std::vector<Effect> effects_;  // of each button
   std::array<bool, kPointers> wasPressed_{};
-  std::array<std::optional<int>, kPointers> presses_{}; // button on which a press began, or -1
+  std::array<std::optional<int>, kPointers> presses_{};  // button on which a press began, or -1
   std::array<std::optional<bool>, kPointers> tipWasInFront_{};
 };
 

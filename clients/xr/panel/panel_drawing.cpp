@@ -8,14 +8,18 @@
 namespace clothstream::xr {
 namespace {
 
-constexpr Ink kGround{22, 23, 27, 240}, kText{0xd6, 0xd9, 0xe0}, kStrong{255, 255, 255}, kQuiet{0xb4, 0xb8, 0xc2};
-constexpr Ink kButton{0x2a, 0x2c, 0x33}, kHovered{0x3d, 0x5a, 0x80}, kChosen{0x35, 0x52, 0x7a}, kOff{0x1d, 0x1f, 0x24};
+constexpr Ink kGround{22, 23, 27, 240}, kText{0xd6, 0xd9, 0xe0}, kStrong{255, 255, 255},
+    kQuiet{0xb4, 0xb8, 0xc2};
+constexpr Ink kButton{0x2a, 0x2c, 0x33}, kHovered{0x3d, 0x5a, 0x80}, kChosen{0x35, 0x52, 0x7a},
+    kOff{0x1d, 0x1f, 0x24};
 constexpr Ink kOutline{0x8f, 0xb4, 0xe8}, kOffText{0x8b, 0x8f, 0x99};
 constexpr float kScale = kPanelPixelsPerMetre;
 constexpr float kInner = kPanelWidth - 2 * kPanelMargin;
-constexpr float kDetailPart = 0.3F, kTextPart = 0.65F; // of the width
+constexpr float kDetailPart = 0.3F, kTextPart = 0.65F;  // of the width
 
-float pixels(float rows) { return rows * kPanelRow * kScale; }
+float pixels(float rows) {
+  return rows * kPanelRow * kScale;
+}
 
 }  // namespace
 
@@ -109,12 +113,12 @@ void PanelPainter::drawArea(const PanelArea& area, bool isHovered, Picture& pict
     painter_.write(picture, painter_.fit(area.text, size, room), left + inset, middle, size, ink);
   } else {
     const float size = pixels(kButtonSize);
-    painter_.write(picture, painter_.fit(area.text, size, width - 2 * inset), left + width / 2, middle, size, ink,
-                   Align::kCentre);
+    painter_.write(picture, painter_.fit(area.text, size, width - 2 * inset), left + width / 2, middle, size,
+                   ink, Align::kCentre);
   }
   if (!area.detail.empty())
-    painter_.write(picture, painter_.fit(area.detail, detailSize, kDetailPart * width), left + width - inset, middle,
-                   detailSize, kQuiet, Align::kRight);
+    painter_.write(picture, painter_.fit(area.detail, detailSize, kDetailPart * width), left + width - inset,
+                   middle, detailSize, kQuiet, Align::kRight);
 }
 
 }  // namespace clothstream::xr

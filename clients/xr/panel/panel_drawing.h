@@ -18,7 +18,7 @@ namespace clothstream::xr {
 struct PanelLine {
   float top = 0;
   std::string text, detail;
-  bool isStrong = false; // large and bold
+  bool isStrong = false;  // large and bold
 };
 struct PanelArea {
   float left = 0, top = 0, width = 0, height = 0;
@@ -30,17 +30,17 @@ struct PanelArea {
 struct PanelDrawing {
   std::vector<PanelLine> lines;
   std::vector<PanelArea> areas;
-  std::array<int, 2> hovered{-1, -1}; // indices of areas
-  float height = 0;                   // of what is drawn; the picture below is transparent
+  std::array<int, 2> hovered{-1, -1};  // indices of areas
+  float height = 0;                    // of what is drawn; the picture below is transparent
 };
 
 inline constexpr float kPanelWidth = 0.46F, kPanelRow = 0.05F, kPanelMargin = 0.018F, kPanelGap = 0.004F;
-inline constexpr float kPanelRows = 15; // most, with the title
+inline constexpr float kPanelRows = 15;  // most, with the title
 inline constexpr float kPanelHeight = 2 * kPanelMargin + kPanelRow * kPanelRows;
 inline constexpr float kPanelPixelsPerMetre = 1400;
 // Sizes of texts, as fractions of the height of a row.
 inline constexpr float kTitleSize = 0.5F, kTextSize = 0.4F, kButtonSize = 0.36F, kDetailSize = 0.34F;
-inline constexpr float kLineHeight = 0.6F; // of further lines of a text, in rows
+inline constexpr float kLineHeight = 0.6F;  // of further lines of a text, in rows
 
 class PanelPainter {
  public:
@@ -62,10 +62,10 @@ class PanelPainter {
   void draw(const PanelDrawing& drawing, Picture& picture);
   void drawArea(const PanelArea& area, bool isHovered, Picture& picture);
 
-  TextPainter painter_; // of the thread
-  Picture shown_;       // of the caller
+  TextPainter painter_;  // of the thread
+  Picture shown_;        // of the caller
 
-  std::mutex mutex_; // of all below
+  std::mutex mutex_;  // of all below
   std::condition_variable changed_;
   PanelDrawing wanted_;
   Picture finished_;

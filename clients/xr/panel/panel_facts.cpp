@@ -54,7 +54,8 @@ void readPanelFacts(cs_client* client, std::uint64_t nowUs, PanelFacts& facts) {
   facts.figures.clear();
   cs_statistics statistics;
   cs_stage_statistics stages;
-  if (cs_get_statistics(client, nowUs, &statistics) == 0 || cs_get_stage_statistics(client, &stages) == 0) return;
+  if (cs_get_statistics(client, nowUs, &statistics) == 0 || cs_get_stage_statistics(client, &stages) == 0)
+    return;
   const double up = statistics.round_trip_ms / 2;
   facts.figures = {
       {"stream", fmt::format("{:.0f} frames/s", statistics.frames_per_second)},

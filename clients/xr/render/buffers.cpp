@@ -81,7 +81,8 @@ void runNow(const GraphicsDevice& device, const std::function<void(VkCommandBuff
   check(vkQueueWaitIdle(device.queue), "vkQueueWaitIdle");
 }
 
-Buffer deviceBuffer(const GraphicsDevice& device, const void* data, VkDeviceSize bytes, VkBufferUsageFlags usage) {
+Buffer deviceBuffer(const GraphicsDevice& device, const void* data, VkDeviceSize bytes,
+                    VkBufferUsageFlags usage) {
   Buffer buffer(device, std::max<VkDeviceSize>(bytes, 16), usage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false);
   if (bytes == 0) return buffer;
   const Buffer staging(device, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true);

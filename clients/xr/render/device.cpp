@@ -11,11 +11,14 @@ void openVulkanLoader() {
   if (volkInitialize() != VK_SUCCESS)
     throw std::runtime_error(
         "the Vulkan loader libvulkan.so.1 cannot be opened. Install Debian's libvulkan1, and a driver: "
-        "mesa-vulkan-drivers has the software device and drives AMD and Intel GPUs; for NVIDIA install nvidia-driver "
+        "mesa-vulkan-drivers has the software device and drives AMD and Intel GPUs; for NVIDIA install "
+        "nvidia-driver "
         "and nvidia-vulkan-icd");
 }
 
-std::vector<const char*> requiredDeviceExtensions() { return {}; }
+std::vector<const char*> requiredDeviceExtensions() {
+  return {};
+}
 
 std::string unsuitableBecause(VkPhysicalDevice physical) {
   VkPhysicalDeviceProperties properties{};
@@ -23,7 +26,8 @@ std::string unsuitableBecause(VkPhysicalDevice physical) {
   const std::string name = properties.deviceName;
   if (properties.apiVersion < kVulkanVersion)
     return fmt::format("{} has Vulkan {}.{}; the renderer needs 1.2. Update the driver.", name,
-                       VK_API_VERSION_MAJOR(properties.apiVersion), VK_API_VERSION_MINOR(properties.apiVersion));
+                       VK_API_VERSION_MAJOR(properties.apiVersion),
+                       VK_API_VERSION_MINOR(properties.apiVersion));
   VkPhysicalDeviceVulkan11Features multiview{};
   multiview.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES;
   VkPhysicalDeviceFeatures2 features{};

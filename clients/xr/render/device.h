@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The Vulkan device that the renderer draws with, and what it must be able to do. Functions of Vulkan are loaded at run
-// time by volk; every source of this client includes <volk.h>, never <vulkan/vulkan.h>.
+// The Vulkan device that the renderer draws with, and what it must be able to do. Functions of Vulkan are
+// loaded at run time by volk; every source of this client includes <volk.h>, never <vulkan/vulkan.h>.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 
 namespace clothstream::xr {
 
-// Handles that whoever made the device owns. They must outlive everything that uses them. All functions of this client
-// that submit to the queue are called from one thread.
+// Handles that whoever made the device owns. They must outlive everything that uses them. All functions of
+// this client that submit to the queue are called from one thread.
 struct GraphicsDevice {
   VkInstance instance = VK_NULL_HANDLE;
   VkPhysicalDevice physical = VK_NULL_HANDLE;
@@ -26,8 +26,8 @@ struct GraphicsDevice {
 // Version of Vulkan that instance and device must have. Multiview and depth resolves are part of it.
 inline constexpr std::uint32_t kVulkanVersion = VK_API_VERSION_1_2;
 
-// Opens the Vulkan loader of the system and fills in the functions that need no instance. Call once, first. Throws
-// std::runtime_error with what to install if there is none.
+// Opens the Vulkan loader of the system and fills in the functions that need no instance. Call once, first.
+// Throws std::runtime_error with what to install if there is none.
 void openVulkanLoader();
 
 // What the renderer needs in addition to kVulkanVersion. No extensions at present.
@@ -39,9 +39,9 @@ std::string unsuitableBecause(VkPhysicalDevice physical);
 // First queue family with graphics and compute; none if there is none.
 std::optional<std::uint32_t> graphicsQueueFamily(VkPhysicalDevice physical);
 
-// Parameters of vkCreateInstance, or of xrCreateVulkanInstanceKHR. `extensions` must outlive the request. Validation,
-// with checks of synchronisation, is on if the environment variable CLOTHSTREAM_VALIDATION is 1; the constructor throws
-// std::runtime_error if the layer is not installed then.
+// Parameters of vkCreateInstance, or of xrCreateVulkanInstanceKHR. `extensions` must outlive the request.
+// Validation, with checks of synchronisation, is on if the environment variable CLOTHSTREAM_VALIDATION is 1;
+// the constructor throws std::runtime_error if the layer is not installed then.
 class InstanceRequest {
  public:
   explicit InstanceRequest(std::span<const char* const> extensions);
@@ -59,8 +59,8 @@ class InstanceRequest {
   VkInstanceCreateInfo info_{};
 };
 
-// Loads the functions of an instance. With validation, also logs and counts the messages of the layer. Make it right after
-// the instance, and destroy it before the instance. At most one exists at a time.
+// Loads the functions of an instance. With validation, also logs and counts the messages of the layer. Make
+// it right after the instance, and destroy it before the instance. At most one exists at a time.
 class LoadedInstance {
  public:
   explicit LoadedInstance(VkInstance instance);
@@ -73,11 +73,12 @@ class LoadedInstance {
   VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
 };
 
-// Parameters of vkCreateDevice, or of xrCreateVulkanDeviceKHR: one queue of the family, and the features that the
-// renderer needs. `extensions` are added to the required ones and must outlive the request.
+// Parameters of vkCreateDevice, or of xrCreateVulkanDeviceKHR: one queue of the family, and the features that
+// the renderer needs. `extensions` are added to the required ones and must outlive the request.
 class DeviceRequest {
  public:
-  DeviceRequest(VkPhysicalDevice physical, std::uint32_t queueFamily, std::span<const char* const> extensions);
+  DeviceRequest(VkPhysicalDevice physical, std::uint32_t queueFamily,
+                std::span<const char* const> extensions);
   DeviceRequest(const DeviceRequest&) = delete;
   DeviceRequest& operator=(const DeviceRequest&) = delete;
 
@@ -93,7 +94,8 @@ class DeviceRequest {
   VkDeviceCreateInfo info_{};
 };
 
-// Number of messages of the validation layer in this process; 0 without validation. They are also logged as errors.
+// Number of messages of the validation layer in this process; 0 without validation. They are also logged as
+// errors.
 std::uint64_t validationMessages();
 
 }  // namespace clothstream::xr

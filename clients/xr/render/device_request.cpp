@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "clients/xr/render/device.h"
-
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
@@ -8,6 +6,8 @@
 #include <string_view>
 
 #include <spdlog/spdlog.h>
+
+#include "clients/xr/render/device.h"
 
 namespace clothstream::xr {
 namespace {
@@ -67,7 +67,8 @@ InstanceRequest::InstanceRequest(std::span<const char* const> extensions)
   if (validates()) {
     if (!hasLayer(kValidationLayer))
       throw std::runtime_error(
-          "CLOTHSTREAM_VALIDATION is set, but the Vulkan layer VK_LAYER_KHRONOS_validation was not found. Install "
+          "CLOTHSTREAM_VALIDATION is set, but the Vulkan layer VK_LAYER_KHRONOS_validation was not found. "
+          "Install "
           "Debian's vulkan-validationlayers, or unset the variable.");
     // The layer finds hazards between submissions only with this setting.
     setenv("VK_LAYER_ENABLES",
@@ -128,6 +129,8 @@ DeviceRequest::DeviceRequest(VkPhysicalDevice physical, std::uint32_t queueFamil
   info_.ppEnabledExtensionNames = extensions_.data();
 }
 
-std::uint64_t validationMessages() { return messages; }
+std::uint64_t validationMessages() {
+  return messages;
+}
 
 }  // namespace clothstream::xr

@@ -17,8 +17,8 @@ class FrameCommands {
 
   // Waits until the frame kFramesInFlight frames ago is complete, and begins to record.
   VkCommandBuffer begin();
-  // Ends recording and submits. Colours are written after `available`, and `drawn` is signalled at the end; null is
-  // allowed.
+  // Ends recording and submits. Colours are written after `available`, and `drawn` is signalled at the end;
+  // null is allowed.
   void submit(VkSemaphore available = VK_NULL_HANDLE, VkSemaphore drawn = VK_NULL_HANDLE);
   // Number of the frame among those in flight, 0 to kFramesInFlight - 1.
   std::size_t current() const { return current_; }

@@ -15,14 +15,17 @@ struct CapsuleMesh {
   std::uint32_t rows, columns;
 };
 constexpr CapsuleMesh kFine{14, 48}, kCoarse{5, 16};
-constexpr float kFineRadius = 0.045F; // m; larger capsules have the fine mesh
+constexpr float kFineRadius = 0.045F;  // m; larger capsules have the fine mesh
 
 constexpr std::size_t kFirstParts = 16, kFirstSolids = 128, kFirstQuads = 40;
 
-// Names: height, smallest height as an angle from the eye, and distances at which they have faded and begin to fade, m.
+// Names: height, smallest height as an angle from the eye, and distances at which they have faded and begin
+// to fade, m.
 constexpr float kNameHeight = 0.075F, kNameAngle = 0.026F, kFadeTo = 0.3F, kFadeFrom = 0.6F;
 
-shaders::vec4 widened(const Eigen::Vector3f& v, float w) { return {v.x(), v.y(), v.z(), w}; }
+shaders::vec4 widened(const Eigen::Vector3f& v, float w) {
+  return {v.x(), v.y(), v.z(), w};
+}
 
 SolidClass classOf(const Solid& solid) {
   if (solid.hidesOnly) return SolidClass::kHides;
@@ -54,12 +57,13 @@ shaders::SolidRecord recordOf(const Solid& solid, SolidMesh mesh) {
                                     ? Eigen::Vector3f(solid.radius, solid.topRadius, solid.length)
                                     : solid.size;
   const Eigen::Quaternionf& q = solid.pose.orientation;
-  return {.position = widened(solid.pose.position, solid.hidesOnly ? -1 : solid.opacity),
-          .orientation = {q.x(), q.y(), q.z(), q.w()},
-          .shape = widened(shape, std::bit_cast<float>(kindOf(mesh))),
-          .stretch = widened(solid.stretch, std::bit_cast<float>(static_cast<std::uint32_t>(solid.substance))),
-          .colour = widened(solid.colour, solid.roughness),
-          .more = {solid.reflection, 0, 0, 0}};
+  return {
+      .position = widened(solid.pose.position, solid.hidesOnly ? -1 : solid.opacity),
+      .orientation = {q.x(), q.y(), q.z(), q.w()},
+      .shape = widened(shape, std::bit_cast<float>(kindOf(mesh))),
+      .stretch = widened(solid.stretch, std::bit_cast<float>(static_cast<std::uint32_t>(solid.substance))),
+      .colour = widened(solid.colour, solid.roughness),
+      .more = {solid.reflection, 0, 0, 0}};
 }
 
 void addCapsule(const CapsuleMesh& mesh, std::vector<std::uint32_t>& out) {
@@ -67,8 +71,8 @@ void addCapsule(const CapsuleMesh& mesh, std::vector<std::uint32_t>& out) {
     for (std::uint32_t column = 0; column < mesh.columns; ++column) {
       const std::uint32_t next = (column + 1) % mesh.columns;
       const std::uint32_t below = row * mesh.columns, above = below + mesh.columns;
-      for (const std::uint32_t index : {below + column, below + next, above + next, below + column, above + next,
-                                        above + column})
+      for (const std::uint32_t index :
+           {below + column, below + next, above + next, below + column, above + next, above + column})
         out.push_back(index);
     }
   }
@@ -115,8 +119,10 @@ FrameData::FrameData(const GraphicsDevice& device, const Pipelines& pipelines, c
     constexpr VkImageLayout kDepth = VK_IMAGE_LAYOUT_DEPTH_STENCIL_READ_ONLY_OPTIMAL;
     bindImage(slot, shaders::kShadowDepthsBinding, passes.shadowMap().view(), textures.texels(), kDepth);
     bindImage(slot, shaders::kShadowBinding, passes.shadowMap().view(), textures.compared(), kDepth);
-    bindImage(slot, shaders::kWeaveColoursBinding, textures.weaveColours().view(), textures.tiled(), kSampled.layout);
-    bindImage(slot, shaders::kWeaveReliefsBinding, textures.weaveReliefs().view(), textures.tiled(), kSampled.layout);
+    bindImage(slot, shaders::kWeaveColoursBinding, textures.weaveColours().view(), textures.tiled(),
+              kSampled.layout);
+    bindImage(slot, shaders::kWeaveReliefsBinding, textures.weaveReliefs().view(), textures.tiled(),
+              kSampled.layout);
     bindImage(slot, shaders::kPanelBinding, textures.panel().view(), textures.clamped(), kSampled.layout);
     bindImage(slot, shaders::kLabelsBinding, textures.labels().view(), textures.clamped(), kSampled.layout);
   }
@@ -127,7 +133,8 @@ void FrameData::makeSolidIndices() {
   const auto add = [&](SolidMesh mesh, auto&& fill) {
     const auto first = static_cast<std::uint32_t>(indices.size());
     fill();
-    solidIndexRanges_[static_cast<std::size_t>(mesh)] = {first, static_cast<std::uint32_t>(indices.size()) - first};
+    solidIndexRanges_[static_cast<std::size_t>(mesh)] = {first,
+                                                         static_cast<std::uint32_t>(indices.size()) - first};
   };
   const auto count = [&](std::uint32_t corners) {
     for (std::uint32_t i = 0; i < corners; ++i) indices.push_back(i);
@@ -192,7 +199,8 @@ void FrameData::upload(const Stage& stage) {
   topology_ = stage.topology;
 }
 
-VkDescriptorSet FrameData::write(const Stage& stage, std::span<const View> views, const shaders::Frame& frame) {
+VkDescriptorSet FrameData::write(const Stage& stage, std::span<const View> views,
+                                 const shaders::Frame& frame) {
   slot_ = (slot_ + 1) % slots_.size();
   Slot& slot = slots_[slot_];
   shaders::Frame own = frame;
@@ -259,7 +267,8 @@ void FrameData::writeSolids(const Stage& stage, Slot& slot) {
     }
 }
 
-std::uint32_t FrameData::writeQuads(const Stage& stage, std::span<const View> views, const Textures& textures) {
+std::uint32_t FrameData::writeQuads(const Stage& stage, std::span<const View> views,
+                                    const Textures& textures) {
   Slot& slot = slots_[slot_];
   Eigen::Vector3f eye = Eigen::Vector3f::Zero();
   for (const View& view : views) eye += eyeOf(view) / static_cast<float>(views.size());
@@ -271,7 +280,7 @@ std::uint32_t FrameData::writeQuads(const Stage& stage, std::span<const View> vi
     if (layer < 0 || distance <= kFadeTo) continue;
     // Both eyes see the name turned to the point between them, upright.
     Eigen::Vector3f right = away.cross(Eigen::Vector3f::UnitY());
-    if (right.squaredNorm() < 1e-8F) continue; // straight above or below
+    if (right.squaredNorm() < 1e-8F) continue;  // straight above or below
     right.normalize();
     const Eigen::Vector3f up = right.cross(away).normalized();
     const Picture& picture = *label.picture;
@@ -280,7 +289,8 @@ std::uint32_t FrameData::writeQuads(const Stage& stage, std::span<const View> vi
     const VkExtent2D texels = textures.labels().options().size;
     quads_.push_back(
         {.middle = widened(label.position, std::min(1.0F, (distance - kFadeTo) / (kFadeFrom - kFadeTo))),
-         .right = widened(aspect * half * right, static_cast<float>(picture.width) / static_cast<float>(texels.width)),
+         .right = widened(aspect * half * right,
+                          static_cast<float>(picture.width) / static_cast<float>(texels.width)),
          .up = widened(half * up, static_cast<float>(picture.height) / static_cast<float>(texels.height)),
          .look = {static_cast<float>(layer), 0, 0, 0}});
   }

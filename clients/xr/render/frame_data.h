@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the device reads of a stage: copies that stay until the topology changes, and slots of mapped memory for frames
-// in flight.
+// What the device reads of a stage: copies that stay until the topology changes, and slots of mapped memory
+// for frames in flight.
 #pragma once
 
 #include <array>
@@ -31,23 +31,28 @@ struct IndexRange {
 
 class FrameData {
  public:
-  FrameData(const GraphicsDevice& device, const Pipelines& pipelines, const Passes& passes, const Textures& textures);
+  FrameData(const GraphicsDevice& device, const Pipelines& pipelines, const Passes& passes,
+            const Textures& textures);
 
   // Copies the lists of the topology. The device must be idle.
   void upload(const Stage& stage);
 
-  // Starts the next frame: writes everything of the stage into the memory of its slot. Returns the set with all of it.
+  // Starts the next frame: writes everything of the stage into the memory of its slot. Returns the set with
+  // all of it.
   VkDescriptorSet write(const Stage& stage, std::span<const View> views, const shaders::Frame& frame);
   // Staging buffer of the slot.
   const Buffer& staging() const { return slots_[slot_].staging; }
-  // Writes the names and the panel. Call it after Textures::record(). Returns their number, the farthest first.
+  // Writes the names and the panel. Call it after Textures::record(). Returns their number, the farthest
+  // first.
   std::uint32_t writeQuads(const Stage& stage, std::span<const View> views, const Textures& textures);
 
   std::uint64_t topology() const { return topology_; }
   const SolidRanges& solidRanges() const { return ranges_; }
   VkBuffer meshIndices() const { return indices_.get(); }
   VkBuffer solidIndices() const { return solidIndices_.get(); }
-  IndexRange solidIndexRange(SolidMesh mesh) const { return solidIndexRanges_[static_cast<std::size_t>(mesh)]; }
+  IndexRange solidIndexRange(SolidMesh mesh) const {
+    return solidIndexRanges_[static_cast<std::size_t>(mesh)];
+  }
 
  private:
   struct Slot {
@@ -57,7 +62,8 @@ class FrameData {
 
   void makeSolidIndices();
   void bindBuffer(Slot& slot, std::uint32_t binding, VkBuffer buffer) const;
-  void bindImage(Slot& slot, std::uint32_t binding, VkImageView view, VkSampler sampler, VkImageLayout layout) const;
+  void bindImage(Slot& slot, std::uint32_t binding, VkImageView view, VkSampler sampler,
+                 VkImageLayout layout) const;
   // Replaces a mapped buffer of the slot by a larger one if it has fewer bytes.
   void grow(Slot& slot, Buffer& buffer, std::uint32_t binding, VkDeviceSize bytes) const;
   void writeParts(const Stage& stage, Slot& slot) const;

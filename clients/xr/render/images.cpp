@@ -51,10 +51,11 @@ Image::Image(const GraphicsDevice& device, const ImageOptions& options) : option
   VkMemoryAllocateInfo allocation{};
   allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
   allocation.allocationSize = needs.size;
-  allocation.memoryTypeIndex = memoryType(
-      device, needs.memoryTypeBits, 0,
-      VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT |
-          (isTransient ? VkMemoryPropertyFlags{VK_MEMORY_PROPERTY_LAZILY_ALLOCATED_BIT} : VkMemoryPropertyFlags{0}));
+  allocation.memoryTypeIndex =
+      memoryType(device, needs.memoryTypeBits, 0,
+                 VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT |
+                     (isTransient ? VkMemoryPropertyFlags{VK_MEMORY_PROPERTY_LAZILY_ALLOCATED_BIT}
+                                  : VkMemoryPropertyFlags{0}));
   VkDeviceMemory memory = VK_NULL_HANDLE;
   check(vkAllocateMemory(device.device, &allocation, nullptr, &memory), "vkAllocateMemory");
   memory_ = {device.device, memory, vkFreeMemory};
@@ -74,14 +75,14 @@ std::uint32_t levelsOf(VkExtent2D size) {
   return static_cast<std::uint32_t>(std::bit_width(std::max(size.width, size.height)));
 }
 
-void changeLayout(VkCommandBuffer commands, const Image& image, std::uint32_t firstLayer, std::uint32_t layers,
-                  const Access& from, const Access& to) {
+void changeLayout(VkCommandBuffer commands, const Image& image, std::uint32_t firstLayer,
+                  std::uint32_t layers, const Access& from, const Access& to) {
   const ImageOptions& options = image.options();
   barrier(commands, image, {options.aspect, 0, options.levels, firstLayer, layers}, from, to);
 }
 
-void recordTexels(VkCommandBuffer commands, const Image& image, std::uint32_t layer, VkExtent2D size, VkBuffer from,
-                  VkDeviceSize offset, bool wasUndefined) {
+void recordTexels(VkCommandBuffer commands, const Image& image, std::uint32_t layer, VkExtent2D size,
+                  VkBuffer from, VkDeviceSize offset, bool wasUndefined) {
   const ImageOptions& options = image.options();
   const Access before = wasUndefined ? Access{VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, 0, VK_IMAGE_LAYOUT_UNDEFINED}
                                      : Access{VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, 0, kSampled.layout};

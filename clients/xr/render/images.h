@@ -16,7 +16,7 @@ struct ImageOptions {
   VkSampleCountFlagBits samples = VK_SAMPLE_COUNT_1_BIT;
   VkImageUsageFlags usage = 0;
   VkImageAspectFlags aspect = VK_IMAGE_ASPECT_COLOR_BIT;
-  bool array = true; // the view is one of an array, also with one layer
+  bool array = true;  // the view is one of an array, also with one layer
 };
 
 // A 2D image with its own memory and a view of all of it.
@@ -31,7 +31,7 @@ class Image {
 
  private:
   ImageOptions options_;
-  Owned<VkDeviceMemory> memory_; // outlives the image
+  Owned<VkDeviceMemory> memory_;  // outlives the image
   Owned<VkImage> image_;
   Owned<VkImageView> view_;
 };
@@ -45,16 +45,16 @@ struct Access {
   VkAccessFlags access = 0;
   VkImageLayout layout = VK_IMAGE_LAYOUT_UNDEFINED;
 };
-void changeLayout(VkCommandBuffer commands, const Image& image, std::uint32_t firstLayer, std::uint32_t layers,
-                  const Access& from, const Access& to);
+void changeLayout(VkCommandBuffer commands, const Image& image, std::uint32_t firstLayer,
+                  std::uint32_t layers, const Access& from, const Access& to);
 
 // How shaders of fragments read an image.
 inline constexpr Access kSampled{VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT,
                                  VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL};
 
-// Records a copy of texels from a buffer into the upper left part of a layer, and makes its smaller levels. The layer was
-// sampled or undefined before, and is sampled afterwards.
-void recordTexels(VkCommandBuffer commands, const Image& image, std::uint32_t layer, VkExtent2D size, VkBuffer from,
-                  VkDeviceSize offset, bool wasUndefined);
+// Records a copy of texels from a buffer into the upper left part of a layer, and makes its smaller levels.
+// The layer was sampled or undefined before, and is sampled afterwards.
+void recordTexels(VkCommandBuffer commands, const Image& image, std::uint32_t layer, VkExtent2D size,
+                  VkBuffer from, VkDeviceSize offset, bool wasUndefined);
 
 }  // namespace clothstream::xr

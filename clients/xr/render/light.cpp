@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "clients/xr/render/light.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
-
-#include <Eigen/Geometry>
 
 namespace clothstream::xr {
 namespace {
@@ -21,7 +20,9 @@ struct Sky {
   Colour key = 3 * fromSrgb(0xfff3e2), rim = 2 * fromSrgb(0xcfe2fa);
 };
 
-Eigen::Vector3f rimDirection() { return Eigen::Vector3f(-0.8F, 0.5F, -0.7F).normalized(); }
+Eigen::Vector3f rimDirection() {
+  return Eigen::Vector3f(-0.8F, 0.5F, -0.7F).normalized();
+}
 
 float smoothstep(float x, float low, float high) {
   const float t = std::clamp((x - low) / (high - low), 0.0F, 1.0F);
@@ -55,11 +56,15 @@ std::array<float, 9> basis(const Eigen::Vector3f& d) {
           0.546274F * (d.x() * d.x() - d.y() * d.y())};
 }
 
-shaders::vec4 widened(const Eigen::Vector3f& v, float w = 0) { return {v.x(), v.y(), v.z(), w}; }
+shaders::vec4 widened(const Eigen::Vector3f& v, float w = 0) {
+  return {v.x(), v.y(), v.z(), w};
+}
 
 }  // namespace
 
-Eigen::Vector3f keyDirection() { return Eigen::Vector3f(0.8F, 1.0F, 0.65F).normalized(); }
+Eigen::Vector3f keyDirection() {
+  return Eigen::Vector3f(0.8F, 1.0F, 0.65F).normalized();
+}
 
 void setLight(shaders::Frame& frame) {
   const Sky sky;

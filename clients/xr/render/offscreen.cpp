@@ -12,7 +12,8 @@ namespace {
 
 constexpr Access kCopied{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_READ_BIT,
                          VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL};
-constexpr Access kColourWritten{VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT, VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT,
+constexpr Access kColourWritten{VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT,
+                                VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT,
                                 VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL};
 // A resolve of depth writes in the stage of colours.
 constexpr Access kDepthWritten{
@@ -38,15 +39,17 @@ Offscreen::Offscreen(const GraphicsDevice& device, VkExtent2D size, std::uint32_
                        .size = size,
                        .layers = views,
                        .usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT}),
-      pixels_(device, VkDeviceSize{4} * size.width * size.height * views, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true) {
+      pixels_(device, VkDeviceSize{4} * size.width * size.height * views, VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+              true) {
   if (!hasDepth) return;
-  depth_.emplace(device,
-                 ImageOptions{.format = VK_FORMAT_D32_SFLOAT,
-                              .size = size,
-                              .layers = views,
-                              .usage = VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT,
-                              .aspect = VK_IMAGE_ASPECT_DEPTH_BIT});
-  depths_ = Buffer(device, VkDeviceSize{4} * size.width * size.height * views, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
+  depth_.emplace(device, ImageOptions{.format = VK_FORMAT_D32_SFLOAT,
+                                      .size = size,
+                                      .layers = views,
+                                      .usage = VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT |
+                                               VK_IMAGE_USAGE_TRANSFER_SRC_BIT,
+                                      .aspect = VK_IMAGE_ASPECT_DEPTH_BIT});
+  depths_ = Buffer(device, VkDeviceSize{4} * size.width * size.height * views,
+                   VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
 }
 
 void Offscreen::recordRead(VkCommandBuffer commands) const {
@@ -56,8 +59,8 @@ void Offscreen::recordRead(VkCommandBuffer commands) const {
   barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
   barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
   barrier.dstAccessMask = VK_ACCESS_HOST_READ_BIT;
-  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &barrier, 0,
-                       nullptr, 0, nullptr);
+  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &barrier,
+                       0, nullptr, 0, nullptr);
 }
 
 std::span<const std::uint8_t> Offscreen::pixels(std::uint32_t view) const {
@@ -76,7 +79,8 @@ void writePng(const std::filesystem::path& file, VkExtent2D size, std::span<cons
   const std::uint8_t* data = pixels.data();
   if (!keepsAlpha) {
     opaque.reserve(std::size_t{3} * size.width * size.height);
-    for (std::size_t i = 0; i + 3 < pixels.size(); i += 4) opaque.insert(opaque.end(), &pixels[i], &pixels[i] + 3);
+    for (std::size_t i = 0; i + 3 < pixels.size(); i += 4)
+      opaque.insert(opaque.end(), &pixels[i], &pixels[i] + 3);
     data = opaque.data();
   }
   png_image image{};
@@ -89,7 +93,8 @@ void writePng(const std::filesystem::path& file, VkExtent2D size, std::span<cons
     throw std::runtime_error(fmt::format("{} cannot be written: {}", file.string(), image.message));
   std::error_code error;
   std::filesystem::rename(part, file, error);
-  if (error) throw std::runtime_error(fmt::format("{} cannot be written: {}", file.string(), error.message()));
+  if (error)
+    throw std::runtime_error(fmt::format("{} cannot be written: {}", file.string(), error.message()));
 }
 
 }  // namespace clothstream::xr

@@ -34,8 +34,8 @@ class Offscreen {
   Buffer pixels_, depths_;
 };
 
-// Writes pixels as above to a PNG file, without alpha unless `keepsAlpha`. The file appears when it is complete. Throws
-// std::runtime_error that names the file.
+// Writes pixels as above to a PNG file, without alpha unless `keepsAlpha`. The file appears when it is
+// complete. Throws std::runtime_error that names the file.
 void writePng(const std::filesystem::path& file, VkExtent2D size, std::span<const std::uint8_t> pixels,
               bool keepsAlpha = false);
 

@@ -27,7 +27,8 @@ int rankOf(VkPhysicalDevice physical) {
 
 }  // namespace
 
-OwnDevice::OwnDevice(std::span<const char* const> instanceExtensions, std::span<const char* const> deviceExtensions) {
+OwnDevice::OwnDevice(std::span<const char* const> instanceExtensions,
+                     std::span<const char* const> deviceExtensions) {
   const InstanceRequest request(instanceExtensions);
   check(vkCreateInstance(request.info(), nullptr, &device_.instance), "vkCreateInstance");
   try {
@@ -39,7 +40,9 @@ OwnDevice::OwnDevice(std::span<const char* const> instanceExtensions, std::span<
   }
 }
 
-OwnDevice::~OwnDevice() { release(); }
+OwnDevice::~OwnDevice() {
+  release();
+}
 
 void OwnDevice::release() {
   if (device_.device != VK_NULL_HANDLE) {

@@ -12,8 +12,8 @@ namespace clothstream::xr {
 
 class OwnDevice {
  public:
-  // Takes the first suitable device, discrete ones before integrated ones, and software last. openVulkanLoader() was
-  // called before. Throws std::runtime_error that says why each device is unsuitable.
+  // Takes the first suitable device, discrete ones before integrated ones, and software last.
+  // openVulkanLoader() was called before. Throws std::runtime_error that says why each device is unsuitable.
   OwnDevice(std::span<const char* const> instanceExtensions, std::span<const char* const> deviceExtensions);
   ~OwnDevice();
   OwnDevice(const OwnDevice&) = delete;

@@ -10,7 +10,8 @@ constexpr VkPipelineStageFlags kDepthStages =
     VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT;
 constexpr VkAccessFlags kDepthAccess =
     VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_READ_BIT | VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT;
-constexpr VkAccessFlags kColourAccess = VK_ACCESS_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT;
+constexpr VkAccessFlags kColourAccess =
+    VK_ACCESS_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT;
 
 VkAttachmentDescription2 attachment(VkFormat format, VkSampleCountFlagBits samples, VkAttachmentLoadOp load,
                                     VkAttachmentStoreOp store, VkImageLayout finalLayout) {
@@ -37,7 +38,8 @@ VkAttachmentReference2 reference(std::uint32_t index, VkImageLayout layout, VkIm
 }
 
 VkSubpassDependency2 dependency(std::uint32_t from, std::uint32_t to, VkPipelineStageFlags fromStages,
-                                VkAccessFlags fromAccess, VkPipelineStageFlags toStages, VkAccessFlags toAccess) {
+                                VkAccessFlags fromAccess, VkPipelineStageFlags toStages,
+                                VkAccessFlags toAccess) {
   VkSubpassDependency2 dependency{};
   dependency.sType = VK_STRUCTURE_TYPE_SUBPASS_DEPENDENCY_2;
   dependency.srcSubpass = from;
@@ -69,8 +71,8 @@ Owned<VkRenderPass> renderPass(VkDevice device, const std::vector<VkAttachmentDe
   return {device, pass, vkDestroyRenderPass};
 }
 
-Owned<VkFramebuffer> makeFramebuffer(VkDevice device, VkRenderPass pass, const std::vector<VkImageView>& views,
-                                     VkExtent2D size) {
+Owned<VkFramebuffer> makeFramebuffer(VkDevice device, VkRenderPass pass,
+                                     const std::vector<VkImageView>& views, VkExtent2D size) {
   VkFramebufferCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO;
   info.renderPass = pass;
@@ -92,50 +94,53 @@ VkImageAspectFlags depthAspect(VkFormat format) {
 
 }  // namespace
 
-Passes::Passes(const GraphicsDevice& device, const RendererOptions& options) : device_(device), options_(options) {
+Passes::Passes(const GraphicsDevice& device, const RendererOptions& options)
+    : device_(device), options_(options) {
   makeShadowPass();
   makePicturePass(false);
   makePicturePass(true);
-  depth_ = Image(device, {.format = options.depth,
-                          .size = options.largest,
-                          .layers = options.views,
-                          .samples = options.samples,
-                          .usage = VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT |
-                                   VK_IMAGE_USAGE_TRANSIENT_ATTACHMENT_BIT,
-                          .aspect = depthAspect(options.depth)});
+  depth_ = Image(
+      device, {.format = options.depth,
+               .size = options.largest,
+               .layers = options.views,
+               .samples = options.samples,
+               .usage = VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSIENT_ATTACHMENT_BIT,
+               .aspect = depthAspect(options.depth)});
   if (options.samples == VK_SAMPLE_COUNT_1_BIT) return;
-  colour_ = Image(device, {.format = options.colour,
-                           .size = options.largest,
-                           .layers = options.views,
-                           .samples = options.samples,
-                           .usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSIENT_ATTACHMENT_BIT});
+  colour_ =
+      Image(device, {.format = options.colour,
+                     .size = options.largest,
+                     .layers = options.views,
+                     .samples = options.samples,
+                     .usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSIENT_ATTACHMENT_BIT});
 }
 
 void Passes::makeShadowPass() {
   constexpr VkFormat kFormat = VK_FORMAT_D32_SFLOAT;
   constexpr VkExtent2D kSize{kShadowTexels, kShadowTexels};
-  shadowMap_ = Image(device_, {.format = kFormat,
-                               .size = kSize,
-                               .usage = VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT | VK_IMAGE_USAGE_SAMPLED_BIT,
-                               .aspect = VK_IMAGE_ASPECT_DEPTH_BIT,
-                               .array = false});
+  shadowMap_ =
+      Image(device_, {.format = kFormat,
+                      .size = kSize,
+                      .usage = VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT | VK_IMAGE_USAGE_SAMPLED_BIT,
+                      .aspect = VK_IMAGE_ASPECT_DEPTH_BIT,
+                      .array = false});
   const VkAttachmentReference2 depth =
       reference(0, VK_IMAGE_LAYOUT_DEPTH_STENCIL_ATTACHMENT_OPTIMAL, VK_IMAGE_ASPECT_DEPTH_BIT);
   VkSubpassDescription2 subpass{};
   subpass.sType = VK_STRUCTURE_TYPE_SUBPASS_DESCRIPTION_2;
   subpass.pipelineBindPoint = VK_PIPELINE_BIND_POINT_GRAPHICS;
   subpass.pDepthStencilAttachment = &depth;
-  shadow_ = renderPass(
-      device_.device,
-      {attachment(kFormat, VK_SAMPLE_COUNT_1_BIT, VK_ATTACHMENT_LOAD_OP_CLEAR, VK_ATTACHMENT_STORE_OP_STORE,
-                  VK_IMAGE_LAYOUT_DEPTH_STENCIL_READ_ONLY_OPTIMAL)},
-      subpass,
-      // The frame before reads the map until its fragments are done.
-      {dependency(VK_SUBPASS_EXTERNAL, 0, VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT | kDepthStages,
-                  VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT, kDepthStages, kDepthAccess),
-       dependency(0, VK_SUBPASS_EXTERNAL, VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT,
-                  VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT, VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT,
-                  VK_ACCESS_SHADER_READ_BIT)});
+  shadow_ =
+      renderPass(device_.device,
+                 {attachment(kFormat, VK_SAMPLE_COUNT_1_BIT, VK_ATTACHMENT_LOAD_OP_CLEAR,
+                             VK_ATTACHMENT_STORE_OP_STORE, VK_IMAGE_LAYOUT_DEPTH_STENCIL_READ_ONLY_OPTIMAL)},
+                 subpass,
+                 // The frame before reads the map until its fragments are done.
+                 {dependency(VK_SUBPASS_EXTERNAL, 0, VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT | kDepthStages,
+                             VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT, kDepthStages, kDepthAccess),
+                  dependency(0, VK_SUBPASS_EXTERNAL, VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT,
+                             VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT,
+                             VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT)});
   shadowFramebuffer_ = makeFramebuffer(device_.device, shadow_.get(), {shadowMap_.view()}, kSize);
 }
 
@@ -146,7 +151,8 @@ void Passes::makePicturePass(bool givesDepth) {
   constexpr auto kKeep = VK_ATTACHMENT_STORE_OP_STORE, kDrop = VK_ATTACHMENT_STORE_OP_DONT_CARE;
   const VkImageAspectFlags aspect = depthAspect(options_.depth);
   std::vector<VkAttachmentDescription2> attachments{
-      attachment(options_.colour, options_.samples, VK_ATTACHMENT_LOAD_OP_CLEAR, resolves ? kDrop : kKeep, kColour),
+      attachment(options_.colour, options_.samples, VK_ATTACHMENT_LOAD_OP_CLEAR, resolves ? kDrop : kKeep,
+                 kColour),
       attachment(options_.depth, options_.samples, VK_ATTACHMENT_LOAD_OP_CLEAR,
                  givesDepth && !resolves ? kKeep : kDrop, kDepth)};
   const VkAttachmentReference2 colour = reference(0, kColour, VK_IMAGE_ASPECT_COLOR_BIT);
@@ -180,14 +186,14 @@ void Passes::makePicturePass(bool givesDepth) {
   pictures_[givesDepth ? 1 : 0] = renderPass(
       device_.device, attachments, subpass,
       {dependency(VK_SUBPASS_EXTERNAL, 0, kStages,
-                  VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT | VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT, kStages,
-                  kColourAccess | kDepthAccess)});
+                  VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT | VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT,
+                  kStages, kColourAccess | kDepthAccess)});
 }
 
 VkFramebuffer Passes::framebuffer(const Target& target) {
   for (const Known& known : framebuffers_)
-    if (known.colour == target.colour && known.depth == target.depth && known.size.width == target.size.width &&
-        known.size.height == target.size.height)
+    if (known.colour == target.colour && known.depth == target.depth &&
+        known.size.width == target.size.width && known.size.height == target.size.height)
       return known.framebuffer.get();
   const bool resolves = options_.samples != VK_SAMPLE_COUNT_1_BIT;
   const bool givesDepth = target.depth != VK_NULL_HANDLE;

@@ -37,10 +37,10 @@ class Passes {
   GraphicsDevice device_;
   RendererOptions options_;
   Owned<VkRenderPass> shadow_;
-  std::array<Owned<VkRenderPass>, 2> pictures_; // without and with depth of the target
+  std::array<Owned<VkRenderPass>, 2> pictures_;  // without and with depth of the target
   Image shadowMap_;
   Owned<VkFramebuffer> shadowFramebuffer_;
-  Image colour_, depth_; // with several samples; depth_ also with one, for targets without depth
+  Image colour_, depth_;  // with several samples; depth_ also with one, for targets without depth
   std::vector<Known> framebuffers_;
 };
 

@@ -26,8 +26,8 @@ using Words = std::span<const std::uint32_t>;
 struct Design {
   Words vertex, fragment;
   bool isShadow = false;
-  bool culls = false;       // triangles that show their back
-  bool tests = true;        // depth
+  bool culls = false;  // triangles that show their back
+  bool tests = true;   // depth
   bool writesDepth = true;
   VkCompareOp nearer = VK_COMPARE_OP_LESS;
 };
@@ -122,8 +122,8 @@ Owned<VkPipeline> graphicsPipeline(VkDevice device, const RendererOptions& optio
   blend.blendEnable = VK_TRUE;
   blend.srcColorBlendFactor = blend.srcAlphaBlendFactor = VK_BLEND_FACTOR_ONE;
   blend.dstColorBlendFactor = blend.dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA;
-  blend.colorWriteMask =
-      VK_COLOR_COMPONENT_R_BIT | VK_COLOR_COMPONENT_G_BIT | VK_COLOR_COMPONENT_B_BIT | VK_COLOR_COMPONENT_A_BIT;
+  blend.colorWriteMask = VK_COLOR_COMPONENT_R_BIT | VK_COLOR_COMPONENT_G_BIT | VK_COLOR_COMPONENT_B_BIT |
+                         VK_COLOR_COMPONENT_A_BIT;
   VkPipelineColorBlendStateCreateInfo blending{};
   blending.sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO;
   blending.attachmentCount = design.isShadow ? 0 : 1;

@@ -41,7 +41,7 @@ struct Renderer::Parts {
         data(graphics, pipelines, passes, textures) {
     setLight(frame);
     frame.encodes = encodesByItself(options.colour) ? 0 : 1;
-    data.upload(Stage{}); // so that a stage without cloths needs no upload
+    data.upload(Stage{});  // so that a stage without cloths needs no upload
   }
 
   void gatherNormals(VkCommandBuffer commands, const Stage& stage) const;
@@ -77,7 +77,9 @@ void Renderer::upload(const Stage& stage) {
   parts_->data.upload(stage);
 }
 
-void Renderer::forgetTargets() { parts_->passes.forgetTargets(); }
+void Renderer::forgetTargets() {
+  parts_->passes.forgetTargets();
+}
 
 void Renderer::record(VkCommandBuffer commands, const Target& target, std::span<const View> views,
                       const Stage& stage) {
@@ -102,13 +104,14 @@ void Renderer::Parts::gatherNormals(VkCommandBuffer commands, const Stage& stage
   if (range.first >= range.end) return;
   vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines.gatherNormals());
   vkCmdPushConstants(commands, pipelines.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(range), &range);
-  vkCmdDispatch(commands, (range.end - range.first + shaders::kNodesPerGroup - 1) / shaders::kNodesPerGroup, 1, 1);
+  vkCmdDispatch(commands, (range.end - range.first + shaders::kNodesPerGroup - 1) / shaders::kNodesPerGroup,
+                1, 1);
   VkMemoryBarrier barrier{};
   barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
   barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
   barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT;
-  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_PIPELINE_STAGE_VERTEX_SHADER_BIT, 0, 1,
-                       &barrier, 0, nullptr, 0, nullptr);
+  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_PIPELINE_STAGE_VERTEX_SHADER_BIT, 0,
+                       1, &barrier, 0, nullptr, 0, nullptr);
 }
 
 void Renderer::Parts::drawShadows(VkCommandBuffer commands, const Stage& stage) const {
@@ -142,7 +145,8 @@ void Renderer::Parts::drawPicture(VkCommandBuffer commands, const Target& target
   begin.pClearValues = clear.data();
   vkCmdBeginRenderPass(commands, &begin, VK_SUBPASS_CONTENTS_INLINE);
   // A pass with multiview begins without anything bound.
-  vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipelines.layout(), 0, 1, &set, 0, nullptr);
+  vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipelines.layout(), 0, 1, &set, 0,
+                          nullptr);
   setViewport(commands, target.size);
   drawSolids(commands, SolidClass::kHides, PipelineKind::kSolid);
   drawSolids(commands, SolidClass::kOpaque, PipelineKind::kSolid);
@@ -180,7 +184,8 @@ void Renderer::Parts::drawSolids(VkCommandBuffer commands, SolidClass which, Pip
   for (std::size_t mesh = 0; mesh < kSolidMeshes; ++mesh) {
     const SolidRange& range = data.solidRanges()[static_cast<std::size_t>(which)][mesh];
     // A plane is the ground of what lies on it, and casts no shadow.
-    const bool casts = static_cast<SolidMesh>(mesh) != SolidMesh::kPlane || kind != PipelineKind::kShadowSolid;
+    const bool casts =
+        static_cast<SolidMesh>(mesh) != SolidMesh::kPlane || kind != PipelineKind::kShadowSolid;
     if (range.count == 0 || !casts) continue;
     const IndexRange indices = data.solidIndexRange(static_cast<SolidMesh>(mesh));
     vkCmdDrawIndexed(commands, indices.count, range.count, indices.first, 0, range.first);

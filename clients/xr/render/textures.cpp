@@ -12,7 +12,7 @@ namespace clothstream::xr {
 namespace {
 
 constexpr std::uint32_t kWeaveTexels = 400;
-constexpr VkExtent2D kLabelSize{640, 72}; // as TextPainter::label() makes them at most
+constexpr VkExtent2D kLabelSize{640, 72};  // as TextPainter::label() makes them at most
 constexpr VkDeviceSize kPanelBytes = VkDeviceSize{4} * kPanelTexels[0] * kPanelTexels[1];
 constexpr VkDeviceSize kLabelBytes = VkDeviceSize{4} * kLabelSize.width * kLabelSize.height;
 constexpr std::uint32_t kLabelsPerFrame = 4;
@@ -37,7 +37,8 @@ bool filtersDepth(const GraphicsDevice& device) {
 Textures::Textures(const GraphicsDevice& device) {
   makeSamplers(device);
   constexpr VkExtent2D kPanelSize{kPanelTexels[0], kPanelTexels[1]};
-  panel_ = Image(device, {.size = kPanelSize, .levels = levelsOf(kPanelSize), .usage = kUsage, .array = false});
+  panel_ =
+      Image(device, {.size = kPanelSize, .levels = levelsOf(kPanelSize), .usage = kUsage, .array = false});
   labels_ = Image(device, {.size = kLabelSize, .layers = kLabelLayers, .levels = 4, .usage = kUsage});
   const Buffer nothing(device, kPanelBytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true);
   std::memset(nothing.data(), 0, kPanelBytes);
@@ -51,7 +52,7 @@ Textures::Textures(const GraphicsDevice& device) {
 
 void Textures::makeSamplers(const GraphicsDevice& device) {
   VkPhysicalDeviceFeatures features{};
-  vkGetPhysicalDeviceFeatures(device.physical, &features); // DeviceRequest turns anisotropy on where it is
+  vkGetPhysicalDeviceFeatures(device.physical, &features);  // DeviceRequest turns anisotropy on where it is
   VkPhysicalDeviceProperties properties{};
   vkGetPhysicalDeviceProperties(device.physical, &properties);
   // Mesa's software device takes minutes for a picture with anisotropy.
@@ -105,7 +106,9 @@ void Textures::makeWeaves(const GraphicsDevice& device) {
   });
 }
 
-VkDeviceSize Textures::stagingBytes() { return kPanelBytes + kLabelsPerFrame * kLabelBytes; }
+VkDeviceSize Textures::stagingBytes() {
+  return kPanelBytes + kLabelsPerFrame * kLabelBytes;
+}
 
 void Textures::record(VkCommandBuffer commands, const Stage& stage, const Buffer& staging) {
   ++calls_;
@@ -124,11 +127,12 @@ void Textures::record(VkCommandBuffer commands, const Stage& stage, const Buffer
     Layer& layer = layerFor(label);
     layer.usedIn = calls_;
     if (layer.id == label.id && layer.revision == name.revision) continue;
-    if (copied == kLabelsPerFrame || name.width > kLabelSize.width || name.height > kLabelSize.height) continue;
+    if (copied == kLabelsPerFrame || name.width > kLabelSize.width || name.height > kLabelSize.height)
+      continue;
     layer = {label.id, name.revision, calls_};
     std::memcpy(bytes + offset, name.texels.data(), name.texels.size());
-    recordTexels(commands, labels_, static_cast<std::uint32_t>(&layer - layers_.data()), {name.width, name.height},
-                 staging.get(), offset, false);
+    recordTexels(commands, labels_, static_cast<std::uint32_t>(&layer - layers_.data()),
+                 {name.width, name.height}, staging.get(), offset, false);
     offset += kLabelBytes;
     ++copied;
   }
@@ -136,7 +140,8 @@ void Textures::record(VkCommandBuffer commands, const Stage& stage, const Buffer
 
 int Textures::layerOf(const Label& label) const {
   for (std::size_t i = 0; i < layers_.size(); ++i)
-    if (layers_[i].revision == label.picture->revision && layers_[i].id == label.id) return static_cast<int>(i);
+    if (layers_[i].revision == label.picture->revision && layers_[i].id == label.id)
+      return static_cast<int>(i);
   return -1;
 }
 

@@ -19,23 +19,23 @@ class Textures {
   const Image& weaveReliefs() const { return weaveReliefs_; }
   const Image& panel() const { return panel_; }
   const Image& labels() const { return labels_; }
-  VkSampler tiled() const { return tiled_.get(); }     // repeats
-  VkSampler clamped() const { return clamped_.get(); } // with levels
-  VkSampler texels() const { return texels_.get(); }   // without a filter
-  VkSampler compared() const { return compared_.get(); } // depth, 1 where the reference is not behind it
+  VkSampler tiled() const { return tiled_.get(); }        // repeats
+  VkSampler clamped() const { return clamped_.get(); }    // with levels
+  VkSampler texels() const { return texels_.get(); }      // without a filter
+  VkSampler compared() const { return compared_.get(); }  // depth, 1 where the reference is not behind it
 
   // Bytes of the staging buffer that record() needs.
   static VkDeviceSize stagingBytes();
-  // Records copies of pictures of the stage that have changed. `staging` is mapped, and not read by the device now.
-  // At most a few new labels are copied in one frame; the others follow in the next frames.
+  // Records copies of pictures of the stage that have changed. `staging` is mapped, and not read by the
+  // device now. At most a few new labels are copied in one frame; the others follow in the next frames.
   void record(VkCommandBuffer commands, const Stage& stage, const Buffer& staging);
   // Layer of a label; -1 if its picture has not been copied.
   int layerOf(const Label& label) const;
 
  private:
   struct Layer {
-    std::uint64_t id = 0, revision = 0; // revision 0: unused
-    std::uint64_t usedIn = 0;           // number of a call of record()
+    std::uint64_t id = 0, revision = 0;  // revision 0: unused
+    std::uint64_t usedIn = 0;            // number of a call of record()
   };
   static constexpr std::size_t kLabelLayers = 32;
 

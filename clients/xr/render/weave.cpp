@@ -18,13 +18,20 @@ struct Texel {
   float height = 0, tone = 1;
 };
 
-float clamped(float value) { return std::clamp(value, 0.0F, 1.0F); }
-float smooth(float t) { return t * t * (3 - 2 * t); }
-int modulo(int value, int period) { return ((value % period) + period) % period; }
+float clamped(float value) {
+  return std::clamp(value, 0.0F, 1.0F);
+}
+float smooth(float t) {
+  return t * t * (3 - 2 * t);
+}
+int modulo(int value, int period) {
+  return ((value % period) + period) % period;
+}
 
 // Pseudo-random number in [0, 1) of two whole numbers.
 float hash(int x, int y) {
-  std::uint32_t bits = (static_cast<std::uint32_t>(x) * 0x27d4eb2dU) ^ (static_cast<std::uint32_t>(y) * 0x165667b1U);
+  std::uint32_t bits =
+      (static_cast<std::uint32_t>(x) * 0x27d4eb2dU) ^ (static_cast<std::uint32_t>(y) * 0x165667b1U);
   bits = (bits ^ (bits >> 15)) * 0x2c1b3c6dU;
   bits = (bits ^ (bits >> 12)) * 0x297a2d39U;
   return static_cast<float>(static_cast<double>(bits ^ (bits >> 15)) / 4294967296.0);
@@ -77,9 +84,13 @@ float levelOf(Pattern pattern, int warp, int weft) {
   return isOver ? 1.0F : -1.0F;
 }
 
-float roundness(float across) { return std::sqrt(std::max(0.0F, 1 - (2 * across - 1) * (2 * across - 1))); }
+float roundness(float across) {
+  return std::sqrt(std::max(0.0F, 1 - (2 * across - 1) * (2 * across - 1)));
+}
 // From 0 in the middle of a crossing to 1/2 at its edge, where the neighbour's half begins.
-float ease(float distance) { return 0.5F * (1 - std::cos(kPi * distance)); }
+float ease(float distance) {
+  return 0.5F * (1 - std::cos(kPi * distance));
+}
 
 // Round threads that pass over and under each other.
 Texel wovenTexel(const Fabric& fabric, float u, float v) {
@@ -88,8 +99,12 @@ Texel wovenTexel(const Fabric& fabric, float u, float v) {
   const float across = x - static_cast<float>(i), along = y - static_cast<float>(j);
   const auto level = [&](int warp, int weft) { return levelOf(fabric.pattern, warp, weft); };
   // Every tenth thread of ripstop is a thick one.
-  const auto thick = [&](int thread) { return fabric.pattern == Pattern::kRipstop && thread % 10 == 0 ? 1.6F : 1.0F; };
-  const auto toneOf = [&](int thread, int seed) { return 1 + fabric.variation * (2 * hash(thread, seed) - 1); };
+  const auto thick = [&](int thread) {
+    return fabric.pattern == Pattern::kRipstop && thread % 10 == 0 ? 1.6F : 1.0F;
+  };
+  const auto toneOf = [&](int thread, int seed) {
+    return 1 + fabric.variation * (2 * hash(thread, seed) - 1);
+  };
   // The thread's level between the middles of two crossings.
   const float here = level(i, j);
   const float warpNext = along < 0.5F ? level(i, j - 1) : level(i, j + 1);
@@ -100,16 +115,18 @@ Texel wovenTexel(const Fabric& fabric, float u, float v) {
       thick(j) * roundness(along) - 0.22F * (here + (weftNext - here) * ease(std::abs(across - 0.5F)));
   const bool isWarp = warpHeight >= weftHeight;
   // Slubs: a thread is thicker and paler for some length.
-  const float slub =
-      isWarp ? noise(static_cast<float>(3 * i) + 0.5F, y / 7, 3 * kThreadCount, kThreadCount / 7)
-             : noise(x / 7, static_cast<float>(3 * j) + 0.5F, kThreadCount / 7, 3 * kThreadCount);
+  const float slub = isWarp
+                         ? noise(static_cast<float>(3 * i) + 0.5F, y / 7, 3 * kThreadCount, kThreadCount / 7)
+                         : noise(x / 7, static_cast<float>(3 * j) + 0.5F, kThreadCount / 7, 3 * kThreadCount);
   const float height = std::max(warpHeight, weftHeight);
-  const float tone = (isWarp ? toneOf(i, 17) : fabric.weft * toneOf(j, 91)) * (1 + fabric.variation * (slub - 0.5F));
+  const float tone =
+      (isWarp ? toneOf(i, 17) : fabric.weft * toneOf(j, 91)) * (1 + fabric.variation * (slub - 0.5F));
   return {height, tone * (0.72F + 0.4F * clamped(height))};
 }
 
 float layers(float u, float v, float cells) {
-  return (noise(u * cells, v * cells, cells, cells) + 0.5F * noise(2 * u * cells, 2 * v * cells, 2 * cells, 2 * cells)) /
+  return (noise(u * cells, v * cells, cells, cells) +
+          0.5F * noise(2 * u * cells, 2 * v * cells, 2 * cells, 2 * cells)) /
          1.5F;
 }
 
@@ -117,8 +134,8 @@ Texel flatTexel(const Fabric& fabric, float u, float v) {
   if (fabric.pattern == Pattern::kGrain) {
     // Creases between the cells of the skin, and pores.
     const float warp = 0.6F * (layers(u, v, 10) - 0.5F);
-    const float crease =
-        std::min(1.0F, 2.2F * cellEdge(u * kThreadCount + warp, v * kThreadCount + warp, static_cast<int>(kThreads)));
+    const float crease = std::min(
+        1.0F, 2.2F * cellEdge(u * kThreadCount + warp, v * kThreadCount + warp, static_cast<int>(kThreads)));
     return {1.2F * crease + 0.4F * layers(u, v, 20),
             (0.8F + 0.2F * crease) * (1 + fabric.variation * (2 * layers(u, v, 5) - 1))};
   }
@@ -130,7 +147,9 @@ Texel flatTexel(const Fabric& fabric, float u, float v) {
   return {bump, 1 + fabric.variation * (bump - 0.5F)};
 }
 
-std::uint8_t byte(float value) { return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 255.0F)); }
+std::uint8_t byte(float value) {
+  return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 255.0F));
+}
 
 }  // namespace
 
@@ -162,7 +181,8 @@ WeaveTexels weave(const Fabric& fabric, std::uint32_t size) {
       // A pale weft is undyed: its texels are nearly white, whatever the colour of the fabric.
       const bool isPale = fabric.weft > 1 && texel.tone > 1.3F;
       const float value = std::min(255.0F, kFactorOne * std::pow(std::max(0.0F, texel.tone), 1 / 2.2F));
-      const std::array<float, 4> colour{(isPale ? 1.25F : 1) * value, (isPale ? 1.1F : 1) * value, value, 255};
+      const std::array<float, 4> colour{(isPale ? 1.25F : 1) * value, (isPale ? 1.1F : 1) * value, value,
+                                        255};
       const std::array<float, 4> relief{127.5F + scale * x, 127.5F + scale * y, 255,
                                         255 * (1 - 0.18F * clamped(texel.height))};
       for (std::size_t k = 0; k < 4; ++k) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Surfaces of fabrics as texels: colour, normal and roughness of one tile that repeats without a seam. The same as
-// clients/web/three/src/weave.ts.
+// Surfaces of fabrics as texels: colour, normal and roughness of one tile that repeats without a seam. The
+// same as clients/web/three/src/weave.ts.
 #pragma once
 
 #include <cstdint>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: MIT
 // A floor with lines that fades into the background. In pass-through it only darkens the real floor.
 #extension GL_GOOGLE_include_directive : require
-#include "clients/xr/shaders/light.glsl"
 #include "clients/xr/shaders/colour.glsl"
+#include "clients/xr/shaders/light.glsl"
 
 layout(location = 0) in vec3 inPlace;
 layout(location = 0) out vec4 outColour;
@@ -12,7 +12,8 @@ layout(location = 0) out vec4 outColour;
 float lines(vec2 place, float spacing, float halfWidth) {
   vec2 width = max(fwidth(place), vec2(1e-6));
   vec2 distance = abs(fract(place / spacing - 0.5) - 0.5) * spacing;
-  vec2 covered = clamp((halfWidth - distance) / width + 0.5, 0.0, 1.0) * min(vec2(1.0), 2.0 * halfWidth / width + 0.15);
+  vec2 covered =
+      clamp((halfWidth - distance) / width + 0.5, 0.0, 1.0) * min(vec2(1.0), 2.0 * halfWidth / width + 0.15);
   return max(covered.x, covered.y);
 }
 
@@ -26,7 +27,8 @@ void main() {
     return;
   }
   float spacing = frame.floorColour.w;
-  float grid = max(0.6 * lines(inPlace.xz, spacing, 0.006 * spacing), lines(inPlace.xz, 5.0 * spacing, 0.01 * spacing));
+  float grid = max(0.6 * lines(inPlace.xz, spacing, 0.006 * spacing),
+                   lines(inPlace.xz, 5.0 * spacing, 0.01 * spacing));
   Material m;
   m.colour = frame.floorColour.rgb * (1.0 - 0.45 * grid);
   m.roughness = 0.55;

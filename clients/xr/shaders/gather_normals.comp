@@ -6,13 +6,25 @@
 #include "clients/xr/shaders/records.h"
 
 layout(local_size_x = 64) in;
-layout(set = 0, binding = kPositionsBinding, std430) readonly buffer Positions { float positions[]; };
-layout(set = 0, binding = kNormalsBinding, std430) writeonly buffer Normals { float normals[]; };
-layout(set = 0, binding = kFanStartsBinding, std430) readonly buffer FanStarts { uint fanStarts[]; };
-layout(set = 0, binding = kFansBinding, std430) readonly buffer Fans { uint fans[]; };
-layout(push_constant) uniform Range { uint first, end; };
+layout(set = 0, binding = kPositionsBinding, std430) readonly buffer Positions {
+  float positions[];
+};
+layout(set = 0, binding = kNormalsBinding, std430) writeonly buffer Normals {
+  float normals[];
+};
+layout(set = 0, binding = kFanStartsBinding, std430) readonly buffer FanStarts {
+  uint fanStarts[];
+};
+layout(set = 0, binding = kFansBinding, std430) readonly buffer Fans {
+  uint fans[];
+};
+layout(push_constant) uniform Range {
+  uint first, end;
+};
 
-vec3 positionOf(uint node) { return vec3(positions[3 * node], positions[3 * node + 1], positions[3 * node + 2]); }
+vec3 positionOf(uint node) {
+  return vec3(positions[3 * node], positions[3 * node + 1], positions[3 * node + 2]);
+}
 
 void main() {
   uint node = first + gl_GlobalInvocationID.x;

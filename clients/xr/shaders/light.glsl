@@ -10,7 +10,8 @@ layout(set = 0, binding = kShadowBinding) uniform sampler2DShadow shadowMap;
 // 1: shadows are softer with the distance from what casts them.
 layout(constant_id = 0) const uint kFullShadows = 1;
 
-// Percentage-closer soft shadows (Fernando 2005), with the numbers of the page (clients/web/page/src/soft_shadow.ts).
+// Percentage-closer soft shadows (Fernando 2005), with the numbers of the page
+// (clients/web/page/src/soft_shadow.ts).
 const float kTexels = 2048.0;
 const float kDepthPerWidth = 3.2 / 8.0;
 const float kSteepest = 6.0 * kDepthPerWidth;
@@ -32,7 +33,8 @@ float litPart(vec3 coord, vec2 slope, float turn, float radius, int samples) {
   float lit = 0.0;
   for (int i = 0; i < samples; ++i) {
     vec2 offset = radius * diskSample(i, samples, turn);
-    lit += texture(shadowMap, vec3(coord.xy + offset, coord.z + dot(slope, offset) - kCurvature * length(offset)));
+    lit += texture(shadowMap,
+                   vec3(coord.xy + offset, coord.z + dot(slope, offset) - kCurvature * length(offset)));
   }
   return lit / float(samples);
 }
@@ -41,7 +43,8 @@ float litPart(vec3 coord, vec2 slope, float turn, float radius, int samples) {
 float keyLit(vec3 place, vec3 normal) {
   vec3 offset = faceforward(normal, -frame.keyDirection.xyz, normal) * frame.keyLight.w;
   vec3 coord = (frame.shadow * vec4(place + offset, 1.0)).xyz;
-  // Slope of depth along the surface in map coordinates. It prevents inclined surfaces from shading themselves.
+  // Slope of depth along the surface in map coordinates. It prevents inclined surfaces from shading
+  // themselves.
   vec3 dx = dFdx(coord);
   vec3 dy = dFdy(coord);
   if (any(lessThan(coord, vec3(0.0))) || any(greaterThan(coord, vec3(1.0)))) return 1.0;
@@ -71,13 +74,14 @@ float keyLit(vec3 place, vec3 normal) {
 
 // Irradiance of the surroundings (Ramamoorthi and Hanrahan 2001).
 vec3 irradianceAt(vec3 n) {
-  return max(vec3(0.0),
-             frame.irradiance[0].rgb * 0.886227 + frame.irradiance[1].rgb * (1.023328 * n.y) +
-                 frame.irradiance[2].rgb * (1.023328 * n.z) + frame.irradiance[3].rgb * (1.023328 * n.x) +
-                 frame.irradiance[4].rgb * (0.858086 * n.x * n.y) + frame.irradiance[5].rgb * (0.858086 * n.y * n.z) +
-                 frame.irradiance[6].rgb * (0.743125 * n.z * n.z - 0.247708) +
-                 frame.irradiance[7].rgb * (0.858086 * n.x * n.z) +
-                 frame.irradiance[8].rgb * (0.429043 * (n.x * n.x - n.y * n.y)));
+  return max(vec3(0.0), frame.irradiance[0].rgb * 0.886227 + frame.irradiance[1].rgb * (1.023328 * n.y) +
+                            frame.irradiance[2].rgb * (1.023328 * n.z) +
+                            frame.irradiance[3].rgb * (1.023328 * n.x) +
+                            frame.irradiance[4].rgb * (0.858086 * n.x * n.y) +
+                            frame.irradiance[5].rgb * (0.858086 * n.y * n.z) +
+                            frame.irradiance[6].rgb * (0.743125 * n.z * n.z - 0.247708) +
+                            frame.irradiance[7].rgb * (0.858086 * n.x * n.z) +
+                            frame.irradiance[8].rgb * (0.429043 * (n.x * n.x - n.y * n.y)));
 }
 
 float lobe(vec3 direction, vec3 middle, float halfAngle, float blur) {
@@ -100,7 +104,7 @@ vec3 radianceAt(vec3 direction, float roughness) {
 struct Material {
   vec3 colour;
   float roughness;
-  vec3 specular; // reflectance at normal incidence
+  vec3 specular;  // reflectance at normal incidence
   vec3 sheen;
   float sheenRoughness;
   float translucency;
@@ -112,7 +116,9 @@ vec3 specularOf(Material m, float nl, float nv, float nh, float lh) {
   float a = m.roughness * m.roughness;
   float d = nh * nh * (a * a - 1.0) + 1.0;
   float distribution = a * a / (kPi * d * d);
-  float visibility = 0.5 / max(nl * sqrt(nv * nv * (1.0 - a * a) + a * a) + nv * sqrt(nl * nl * (1.0 - a * a) + a * a), 1e-4);
+  float visibility =
+      0.5 /
+      max(nl * sqrt(nv * nv * (1.0 - a * a) + a * a) + nv * sqrt(nl * nl * (1.0 - a * a) + a * a), 1e-4);
   vec3 fresnel = m.specular + (vec3(1.0) - m.specular) * pow(1.0 - lh, 5.0);
   return fresnel * distribution * visibility;
 }
@@ -139,8 +145,8 @@ vec3 lightFrom(Material m, vec3 n, vec3 v, vec3 l, vec3 irradiance) {
   return irradiance * (light + m.translucency * max(-nl, 0.0) * m.colour / kPi);
 }
 
-// Light that leaves a surface towards the viewer. `n` is the shading normal and `geometric` that of the geometry, both on
-// the side of the viewer.
+// Light that leaves a surface towards the viewer. `n` is the shading normal and `geometric` that of the
+// geometry, both on the side of the viewer.
 vec3 shade(Material m, vec3 place, vec3 n, vec3 geometric, vec3 eye) {
   vec3 v = normalize(eye - place);
   vec3 light = lightFrom(m, n, v, frame.keyDirection.xyz, keyLit(place, geometric) * frame.keyLight.rgb);
@@ -152,6 +158,7 @@ vec3 shade(Material m, vec3 place, vec3 n, vec3 geometric, vec3 eye) {
   float a004 = min(r.x * r.x, exp2(-9.28 * nv)) * r.x + r.y;
   vec2 ab = vec2(-1.04, 1.04) * a004 + r.zw;
   light += m.reflection * radianceAt(reflect(-v, n), m.roughness) * (m.specular * ab.x + ab.y);
-  if (m.sheen != vec3(0.0)) light += m.sheen * irradianceAt(n) / kPi * pow(1.0 - nv, 3.0) * (0.4 + 0.6 * m.sheenRoughness);
+  if (m.sheen != vec3(0.0))
+    light += m.sheen * irradianceAt(n) / kPi * pow(1.0 - nv, 3.0) * (0.4 + 0.6 * m.sheenRoughness);
   return light;
 }

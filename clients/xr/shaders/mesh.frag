@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: MIT
 // Cloth with two sides, weave, sheen and light that shines through; and hulls.
 #extension GL_GOOGLE_include_directive : require
-#include "clients/xr/shaders/light.glsl"
 #include "clients/xr/shaders/colour.glsl"
+#include "clients/xr/shaders/light.glsl"
 #include "clients/xr/shaders/mesh.glsl"
 
 layout(set = 0, binding = kWeaveColoursBinding) uniform sampler2DArray weaveColours;

@@ -4,7 +4,9 @@
 #include "clients/xr/shaders/frame.glsl"
 #include "clients/xr/shaders/mesh.glsl"
 
-layout(set = 0, binding = kNormalsBinding, std430) readonly buffer Normals { float normals[]; };
+layout(set = 0, binding = kNormalsBinding, std430) readonly buffer Normals {
+  float normals[];
+};
 layout(location = 0) out vec3 outPlace;
 layout(location = 1) out vec3 outNormal;
 layout(location = 2) out vec2 outWeave;

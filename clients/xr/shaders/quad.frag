@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: MIT
 // The panel and the names. Their texels are in sRGB encoding, multiplied with alpha.
 #extension GL_GOOGLE_include_directive : require
-#include "clients/xr/shaders/frame.glsl"
 #include "clients/xr/shaders/colour.glsl"
+#include "clients/xr/shaders/frame.glsl"
 
-layout(set = 0, binding = kQuadsBinding, std430) readonly buffer Quads { QuadRecord quads[]; };
+layout(set = 0, binding = kQuadsBinding, std430) readonly buffer Quads {
+  QuadRecord quads[];
+};
 layout(set = 0, binding = kPanelBinding) uniform sampler2D panel;
 layout(set = 0, binding = kLabelsBinding) uniform sampler2DArray labels;
 layout(location = 0) in vec2 inPlace;

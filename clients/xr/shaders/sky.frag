@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: MIT
 // The bright room behind everything.
 #extension GL_GOOGLE_include_directive : require
-#include "clients/xr/shaders/frame.glsl"
 #include "clients/xr/shaders/colour.glsl"
+#include "clients/xr/shaders/frame.glsl"
 
 layout(location = 0) in vec2 inPlace;
 layout(location = 0) out vec4 outColour;

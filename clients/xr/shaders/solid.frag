@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: MIT
 // Colliders and people. What a collider is made of is computed from its own coordinates.
 #extension GL_GOOGLE_include_directive : require
-#include "clients/xr/shaders/light.glsl"
 #include "clients/xr/shaders/colour.glsl"
+#include "clients/xr/shaders/light.glsl"
 
-layout(set = 0, binding = kSolidsBinding, std430) readonly buffer Solids { SolidRecord solids[]; };
+layout(set = 0, binding = kSolidsBinding, std430) readonly buffer Solids {
+  SolidRecord solids[];
+};
 layout(location = 0) in vec3 inPlace;
 layout(location = 1) in vec3 inNormal;
 layout(location = 2) in vec3 inLocal;
@@ -29,7 +31,8 @@ float noise(vec3 p) {
   vec3 i = floor(p);
   vec3 f = p - i;
   f = f * f * (3.0 - 2.0 * f);
-  return mix(mix(mix(hash(i), hash(i + vec3(1, 0, 0)), f.x), mix(hash(i + vec3(0, 1, 0)), hash(i + vec3(1, 1, 0)), f.x), f.y),
+  return mix(mix(mix(hash(i), hash(i + vec3(1, 0, 0)), f.x),
+                 mix(hash(i + vec3(0, 1, 0)), hash(i + vec3(1, 1, 0)), f.x), f.y),
              mix(mix(hash(i + vec3(0, 0, 1)), hash(i + vec3(1, 0, 1)), f.x),
                  mix(hash(i + vec3(0, 1, 1)), hash(i + vec3(1, 1, 1)), f.x), f.y),
              f.z);

@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Vertices of spheres, capsules, boxes and planes, from their index. Those of a capsule are in rows of equal latitude.
-layout(set = 0, binding = kSolidsBinding, std430) readonly buffer Solids { SolidRecord solids[]; };
+// Vertices of spheres, capsules, boxes and planes, from their index. Those of a capsule are in rows of equal
+// latitude.
+layout(set = 0, binding = kSolidsBinding, std430) readonly buffer Solids {
+  SolidRecord solids[];
+};
 
 const uint kBox = 1;
 const uint kPlane = 2;
 
-vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
+vec3 turned(vec4 q, vec3 v) {
+  return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v);
+}
 
 struct SolidVertex {
-  vec3 local;  // in the frame of the solid
-  vec3 normal; // likewise
+  vec3 local;   // in the frame of the solid
+  vec3 normal;  // likewise
 };
 
 SolidVertex capsuleVertex(vec4 shape, uint index, uint rows, uint columns) {
@@ -33,7 +38,8 @@ SolidVertex boxVertex(vec4 shape, uint index) {
   uint face = index / 6;
   uint axis = face >> 1;
   float side = (face & 1u) == 0 ? 1.0 : -1.0;
-  const vec2 corners[6] = vec2[](vec2(-0.5), vec2(0.5, -0.5), vec2(0.5), vec2(-0.5), vec2(0.5), vec2(-0.5, 0.5));
+  const vec2 corners[6] =
+      vec2[](vec2(-0.5), vec2(0.5, -0.5), vec2(0.5), vec2(-0.5), vec2(0.5), vec2(-0.5, 0.5));
   vec2 c = corners[index % 6];
   c.x *= side;
   SolidVertex vertex;
@@ -44,7 +50,8 @@ SolidVertex boxVertex(vec4 shape, uint index) {
 }
 
 SolidVertex planeVertex(vec4 shape, uint index) {
-  const vec2 corners[6] = vec2[](vec2(-0.5), vec2(0.5), vec2(0.5, -0.5), vec2(-0.5), vec2(-0.5, 0.5), vec2(0.5));
+  const vec2 corners[6] =
+      vec2[](vec2(-0.5), vec2(0.5), vec2(0.5, -0.5), vec2(-0.5), vec2(-0.5, 0.5), vec2(0.5));
   vec2 c = corners[index % 6];
   SolidVertex vertex;
   vertex.local = vec3(c.x * shape.x, 0.0, c.y * shape.z);
@@ -52,16 +59,22 @@ SolidVertex planeVertex(vec4 shape, uint index) {
   return vertex;
 }
 
-// The kind of a capsule has the number of rows of each of its balls in bits 8 to 15 and that of its columns in bits 16 and above.
+// The kind of a capsule has the number of rows of each of its balls in bits 8 to 15 and that of its columns
+// in bits 16 and above.
 SolidVertex vertexOf(SolidRecord solid, uint index) {
   uint kind = floatBitsToUint(solid.shape.w);
   SolidVertex vertex;
-  if ((kind & 0xFFu) == kBox) vertex = boxVertex(solid.shape, index);
-  else if ((kind & 0xFFu) == kPlane) vertex = planeVertex(solid.shape, index);
-  else vertex = capsuleVertex(solid.shape, index, (kind >> 8) & 0xFFu, kind >> 16);
+  if ((kind & 0xFFu) == kBox)
+    vertex = boxVertex(solid.shape, index);
+  else if ((kind & 0xFFu) == kPlane)
+    vertex = planeVertex(solid.shape, index);
+  else
+    vertex = capsuleVertex(solid.shape, index, (kind >> 8) & 0xFFu, kind >> 16);
   vertex.local *= solid.stretch.xyz;
   vertex.normal /= solid.stretch.xyz;
   return vertex;
 }
 
-vec3 placeOf(SolidRecord solid, vec3 local) { return solid.position.xyz + turned(solid.orientation, local); }
+vec3 placeOf(SolidRecord solid, vec3 local) {
+  return solid.position.xyz + turned(solid.orientation, local);
+}

@@ -90,7 +90,9 @@ float linear(std::uint32_t byte) {
 
 }  // namespace
 
-std::span<const Fabric> fabrics() { return kFabrics; }
+std::span<const Fabric> fabrics() {
+  return kFabrics;
+}
 
 Surface surfaceOf(std::string_view material, std::uint32_t dye) {
   std::uint32_t index = 0;
@@ -109,6 +111,8 @@ Surface surfaceOf(std::string_view material, std::uint32_t dye) {
   return surface;
 }
 
-Colour fromSrgb(std::uint32_t rgb) { return {linear(rgb >> 16), linear(rgb >> 8), linear(rgb)}; }
+Colour fromSrgb(std::uint32_t rgb) {
+  return {linear(rgb >> 16), linear(rgb >> 8), linear(rgb)};
+}
 
 }  // namespace clothstream::xr

@@ -12,19 +12,13 @@ namespace {
 
 // Colliders are drawn slightly smaller, because triangles between nodes that touch a shape cut into it.
 constexpr float kShrink = 0.985F;
-constexpr float kPlaneReach = 4; // m; half the edge of what is drawn of a plane
+constexpr float kPlaneReach = 4;  // m; half the edge of what is drawn of a plane
 constexpr float kRayRadius = 0.0015F;
 
 // Colours that differ in hue and in brightness.
 constexpr std::array<std::uint32_t, 8> kColours{0x4f9bd9, 0xe08a4a, 0x6fb56a, 0xc779b8,
                                                 0xd9c04f, 0x5fc4bd, 0xd96a6a, 0x8f86dd};
 constexpr std::uint32_t kVisor = 0x15171c, kYields = 0xff3b1f;
-
-Pose poseOf(const cs_collider& collider) {
-  const float* q = collider.orientation;
-  return {Eigen::Vector3f(collider.position[0], collider.position[1], collider.position[2]),
-          Eigen::Quaternionf(q[3], q[0], q[1], q[2])};
-}
 
 // Shape of a collider that is no hull.
 bool shapeOf(const cs_collider& collider, float shrink, Solid& solid) {
@@ -53,7 +47,15 @@ bool shapeOf(const cs_collider& collider, float shrink, Solid& solid) {
 
 }  // namespace
 
-Colour colourOf(std::uint64_t participant) { return fromSrgb(kColours[participant % kColours.size()]); }
+Pose poseOf(const cs_collider& collider) {
+  const float* q = collider.orientation;
+  return {Eigen::Vector3f(collider.position[0], collider.position[1], collider.position[2]),
+          Eigen::Quaternionf(q[3], q[0], q[1], q[2])};
+}
+
+Colour colourOf(std::uint64_t participant) {
+  return fromSrgb(kColours[participant % kColours.size()]);
+}
 
 bool isHead(const cs_collider& collider) {
   if (collider.participant_id == 0) return false;
@@ -87,7 +89,8 @@ void addSceneCollider(const cs_collider& collider, std::vector<Solid>& out) {
       solid.colour = fromSrgb(0xb7b0a4);
       solid.roughness = 0.8F;
       solid.reflection = 0;
-      // Other shapes are smaller, so a plane is lower. This also avoids flicker with a floor at the same height.
+      // Other shapes are smaller, so a plane is lower. This also avoids flicker with a floor at the same
+      // height.
       solid.pose.position = solid.pose.apply({0, -0.002F, 0});
       break;
   }
@@ -113,8 +116,8 @@ void addParticipantCollider(const cs_collider& collider, const Colour& colour, f
   out.push_back(solid);
 }
 
-void addRod(const Eigen::Vector3f& from, const Eigen::Vector3f& to, float radius, float toRadius, const Solid& look,
-            std::vector<Solid>& out) {
+void addRod(const Eigen::Vector3f& from, const Eigen::Vector3f& to, float radius, float toRadius,
+            const Solid& look, std::vector<Solid>& out) {
   Solid rod = look;
   rod.kind = SolidKind::kCapsule;
   const Eigen::Vector3f along = to - from;
@@ -144,7 +147,8 @@ void addHand(const float* joints, const Colour& colour, bool hidesOnly, std::vec
     bone(hands::kWrist, joint);
 }
 
-void addRay(const Eigen::Vector3f& from, const Eigen::Vector3f& to, const Colour& colour, std::vector<Solid>& out) {
+void addRay(const Eigen::Vector3f& from, const Eigen::Vector3f& to, const Colour& colour,
+            std::vector<Solid>& out) {
   Solid look;
   look.substance = Substance::kGlowing;
   look.colour = colour;

@@ -18,17 +18,19 @@ constexpr std::uint32_t kTopologyEvents = CS_EVENT_DESCRIPTION;
 constexpr std::uint32_t kMaterialEvents = CS_EVENT_PARAMETERS | CS_EVENT_DESCRIPTION;
 constexpr std::uint32_t kPeopleEvents = CS_EVENT_PARTICIPANTS | CS_EVENT_PRESENCE | CS_EVENT_RETURNED;
 constexpr float kOwnOpacity = 0.16F;
-// A hull has at most this number of corners, and is drawn slightly smaller than it is, because triangles between nodes
-// that touch it cut into it. More are those of a mesh, which is drawn smooth and in its true size.
+// A hull has at most this number of corners, and is drawn slightly smaller than it is, because triangles
+// between nodes that touch it cut into it. More are those of a mesh, which is drawn smooth and in its true
+// size.
 constexpr std::uint32_t kMostHullCorners = 128;
 constexpr float kShrink = 0.985F;
 constexpr std::uint32_t kStone = 0x9a958c;
-constexpr float kLabelHeight = 0.16F; // m above the middle of the head, in addition to its radius
-constexpr float kSwing = 0.3F;        // expected motion of a cloth, as a fraction of its size
+constexpr float kLabelHeight = 0.16F;  // m above the middle of the head, in addition to its radius
+constexpr float kSwing = 0.3F;         // expected motion of a cloth, as a fraction of its size
 
 Ink inkOf(const Colour& colour) {
   const auto byte = [](float linear) {
-    const float encoded = linear <= 0.0031308F ? 12.92F * linear : 1.055F * std::pow(linear, 1 / 2.4F) - 0.055F;
+    const float encoded =
+        linear <= 0.0031308F ? 12.92F * linear : 1.055F * std::pow(linear, 1 / 2.4F) - 0.055F;
     return static_cast<std::uint8_t>(std::lround(255 * std::clamp(encoded, 0.0F, 1.0F)));
   };
   return {byte(colour.x()), byte(colour.y()), byte(colour.z()), 255};
@@ -71,7 +73,8 @@ void StageReader::read(cs_client* client, std::uint32_t events, bool drawsOwn, S
   readColliders(client, drawsOwn, stage);
 }
 
-// Returns whether the client still has the description that was read. The event of a new one can come a frame late.
+// Returns whether the client still has the description that was read. The event of a new one can come a frame
+// late.
 bool StageReader::describes(const cs_client* client) const {
   std::uint32_t indexCount = 0;
   const std::uint32_t* triangles = cs_triangles(client, &indexCount);
@@ -187,8 +190,8 @@ void StageReader::readHull(const cs_client* client, std::uint32_t index, Stage& 
   hulls_.push_back(hull);
 }
 
-// Box in which the cloths will mostly stay, with the colliders of the scene; and the floor, which is y = 0 if the box
-// ends near it, and else its lower end.
+// Box in which the cloths will mostly stay, with the colliders of the scene; and the floor, which is y = 0 if
+// the box ends near it, and else its lower end.
 void StageReader::readBounds(const cs_client* client, Stage& stage) const {
   Eigen::AlignedBox3f box;
   const float* rest = cs_positions(client);
@@ -212,6 +215,16 @@ void StageReader::readBounds(const cs_client* client, Stage& stage) const {
     const float reach = reachOf(collider);
     if (reach == 0) continue;
     box.extend(Eigen::AlignedBox3f(middle.array() - reach, middle.array() + reach));
+  }
+  for (const Hull& hull : hulls_) {
+    cs_collider collider;
+    std::uint32_t vertexCount = 0, indexCount = 0;
+    const std::uint32_t* triangles = nullptr;
+    const float* corners = cs_get_hull(client, hull.collider, &vertexCount, &triangles, &indexCount);
+    if (corners == nullptr || cs_get_collider(client, hull.collider, &collider) == 0) continue;
+    const Pose pose = poseOf(collider);
+    for (std::uint32_t i = 0; i < vertexCount; ++i)
+      box.extend(pose.apply(Eigen::Map<const Eigen::Vector3f>(corners + std::size_t{3} * i)));
   }
   if (box.isEmpty()) box = Eigen::AlignedBox3f(Eigen::Vector3f(-1, 0, -1), Eigen::Vector3f(1, 2, 1));
   const float size = box.diagonal().norm();
@@ -270,9 +283,7 @@ void StageReader::readHulls(const cs_client* client, bool hidesOwnHead, Stage& s
     for (std::size_t i = 0; i < std::size_t{3} * vertexCount; ++i) out[i] = hull.shrink * corners[i];
     if (hull.headPart) stage.parts[*hull.headPart].visible = !hidesOwnHead || worn != hull.name;
     if (cs_get_played_collider(client, hull.collider, &collider) == 0) continue;
-    const float* q = collider.orientation;
-    stage.frames[hull.frame] = {Eigen::Vector3f(collider.position[0], collider.position[1], collider.position[2]),
-                                Eigen::Quaternionf(q[3], q[0], q[1], q[2])};
+    stage.frames[hull.frame] = poseOf(collider);
   }
 }
 

@@ -21,26 +21,26 @@ class StageReader {
   // `painter` draws names, and must outlive the reader.
   explicit StageReader(TextPainter& painter);
 
-  // Reads what cs_play_out has chosen, and colliders, participants and materials. Call with the client acquired, after
-  // cs_play_out. `events`: all CS_EVENT bits since the last call; CS_EVENT_DESCRIPTION, CS_EVENT_PARAMETERS,
-  // CS_EVENT_PARTICIPANTS and CS_EVENT_PRESENCE make it read what seldom changes. Before the description, the stage has
-  // no cloth. `drawsOwn`: own colliders are drawn faintly, for programs that do not draw hands themselves. Allocates
-  // nothing while topology and participants stay.
+  // Reads what cs_play_out has chosen, and colliders, participants and materials. Call with the client
+  // acquired, after cs_play_out. `events`: all CS_EVENT bits since the last call; CS_EVENT_DESCRIPTION,
+  // CS_EVENT_PARAMETERS, CS_EVENT_PARTICIPANTS and CS_EVENT_PRESENCE make it read what seldom changes. Before
+  // the description, the stage has no cloth. `drawsOwn`: own colliders are drawn faintly, for programs that
+  // do not draw hands themselves. Allocates nothing while topology and participants stay.
   void read(cs_client* client, std::uint32_t events, bool drawsOwn, Stage& stage);
 
  private:
   // A collider of the scene that is a hull or mesh.
   struct Hull {
-    std::uint32_t collider = 0; // index
+    std::uint32_t collider = 0;  // index
     std::uint32_t firstNode = 0, nodeCount = 0;
-    std::uint32_t frame = 0;    // in Stage::frames
+    std::uint32_t frame = 0;  // in Stage::frames
     float shrink = 1;
-    std::optional<std::uint32_t> headPart; // part with the head, of a body that can be worn
+    std::optional<std::uint32_t> headPart;  // part with the head, of a body that can be worn
     std::string name;
   };
   struct Person {
     std::string name;
-    std::shared_ptr<const Picture> picture; // null without a name
+    std::shared_ptr<const Picture> picture;  // null without a name
   };
   struct ClothPart {
     std::uint32_t cloth = 0;
@@ -62,7 +62,7 @@ class StageReader {
 
   TextPainter& painter_;
   std::vector<Hull> hulls_;
-  std::vector<ClothPart> parts_; // the first parts of the stage
+  std::vector<ClothPart> parts_;  // the first parts of the stage
   std::unordered_map<std::uint64_t, Person> people_;
   // Of the description that was read.
   const std::uint32_t* triangles_ = nullptr;

@@ -11,7 +11,9 @@ namespace {
 
 constexpr std::uint32_t kUnused = UINT32_MAX;
 
-bool isGrid(const Shape& shape) { return shape.rows > 1 && shape.columns > 1; }
+bool isGrid(const Shape& shape) {
+  return shape.rows > 1 && shape.columns > 1;
+}
 
 Eigen::Vector3f nodeOf(const Shape& shape, std::uint32_t node) {
   const float* at = &shape.positions[3 * std::size_t{node - shape.firstNode}];
@@ -84,19 +86,20 @@ float metresPerUv(const Shape& shape) {
 void appendGridVertices(const Shape& shape, Stage& stage) {
   const std::uint32_t first = shape.firstNode;
   const float width = (nodeOf(shape, first + shape.columns - 1) - nodeOf(shape, first)).norm();
-  const float height = (nodeOf(shape, first + (shape.rows - 1) * shape.columns) - nodeOf(shape, first)).norm();
+  const float height =
+      (nodeOf(shape, first + (shape.rows - 1) * shape.columns) - nodeOf(shape, first)).norm();
   for (std::uint32_t i = 0; i < shape.nodeCount; ++i)
     stage.vertices.push_back(
         {first + i, static_cast<float>(i % shape.columns) / static_cast<float>(shape.columns - 1) * width,
          -static_cast<float>(i / shape.columns) / static_cast<float>(shape.rows - 1) * height});
 }
 
-// Appends the vertices of a mesh, and the indices of its corners. A node with several texture coordinates is drawn as
-// several vertices.
+// Appends the vertices of a mesh, and the indices of its corners. A node with several texture coordinates is
+// drawn as several vertices.
 void appendMeshVertices(const Shape& shape, std::uint32_t firstVertex, Stage& stage) {
   const float scale = shape.uvIndices.empty() ? 0 : metresPerUv(shape);
   std::vector<std::uint32_t> uvOf(shape.nodeCount, kUnused);
-  std::unordered_map<std::uint64_t, std::uint32_t> copies; // by node and texture coordinate
+  std::unordered_map<std::uint64_t, std::uint32_t> copies;  // by node and texture coordinate
   for (std::uint32_t i = 0; i < shape.nodeCount; ++i) stage.vertices.push_back({shape.firstNode + i, 0, 0});
   const auto place = [&](DrawnVertex& vertex, std::uint32_t uv) {
     if (shape.uvIndices.empty()) return;
@@ -132,7 +135,8 @@ bool append(const Shape& shape, Stage& stage) {
   const auto firstVertex = static_cast<std::uint32_t>(stage.vertices.size());
   if (isGrid(shape)) {
     appendGridVertices(shape, stage);
-    for (const std::uint32_t node : shape.corners) stage.indices.push_back(firstVertex + node - shape.firstNode);
+    for (const std::uint32_t node : shape.corners)
+      stage.indices.push_back(firstVertex + node - shape.firstNode);
     return true;
   }
   appendMeshVertices(shape, firstVertex, stage);

@@ -15,11 +15,11 @@ namespace clothstream::xr {
 namespace {
 
 constexpr char32_t kReplacement = 0xFFFD;
-constexpr std::size_t kMostFonts = 64; // of the system's order of preference, per weight
+constexpr std::size_t kMostFonts = 64;  // of the system's order of preference, per weight
 
 struct Source {
   std::string file;
-  int index = 0; // in a collection
+  int index = 0;  // in a collection
   FT_Face face = nullptr;
   bool failed = false;
 };
@@ -51,7 +51,7 @@ std::vector<Source> systemFonts(Weight weight) {
 
 struct Fonts::Parts {
   FT_Library library = nullptr;
-  std::array<std::vector<Source>, 2> sources; // by Weight
+  std::array<std::vector<Source>, 2> sources;  // by Weight
   std::map<std::tuple<std::uint32_t, std::uint32_t, char32_t>, Glyph> glyphs;
 
   ~Parts() {
@@ -113,7 +113,7 @@ const Glyph& Fonts::glyph(char32_t character, std::uint32_t pixels, Weight weigh
   FT_Face face = parts_->faceWith(character, weight);
   if (FT_Set_Pixel_Sizes(face, 0, pixels) != 0 ||
       FT_Load_Char(face, character, FT_LOAD_RENDER | FT_LOAD_TARGET_LIGHT) != 0)
-    return glyph; // a damaged font: nothing is drawn for this character
+    return glyph;  // a damaged font: nothing is drawn for this character
   const FT_GlyphSlot slot = face->glyph;
   const FT_Bitmap& bitmap = slot->bitmap;
   glyph.advance = static_cast<float>(slot->linearHoriAdvance) / 65536.0F;
@@ -137,9 +137,11 @@ float Fonts::capHeight(std::uint32_t pixels, Weight weight) {
 char32_t nextCharacter(std::string_view& utf8) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(utf8[i]); };
   const std::uint8_t first = byte(0);
-  const std::size_t length = first < 0x80 ? 1 : first >= 0xC2 && first < 0xE0 ? 2 : first >= 0xE0 && first < 0xF0 ? 3
-                             : first >= 0xF0 && first < 0xF5                  ? 4
-                                                                              : 0;
+  const std::size_t length = first < 0x80                    ? 1
+                             : first >= 0xC2 && first < 0xE0 ? 2
+                             : first >= 0xE0 && first < 0xF0 ? 3
+                             : first >= 0xF0 && first < 0xF5 ? 4
+                                                             : 0;
   char32_t character = length <= 1 ? first : first & (0x7FU >> length);
   bool isValid = length > 0 && utf8.size() >= length;
   for (std::size_t i = 1; isValid && i < length; ++i) {

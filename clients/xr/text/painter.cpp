@@ -13,7 +13,9 @@ constexpr std::string_view kEllipsis = "\u2026";
 constexpr float kLabelPixels = 40;
 constexpr std::uint32_t kLabelHeight = 72, kLabelPadding = 26, kLabelMost = 640;
 
-std::uint32_t whole(float pixels) { return static_cast<std::uint32_t>(std::max(1.0F, std::round(pixels))); }
+std::uint32_t whole(float pixels) {
+  return static_cast<std::uint32_t>(std::max(1.0F, std::round(pixels)));
+}
 
 // Lays ink with this coverage (0 to 255) over a texel.
 void blend(std::uint8_t* texel, Ink ink, std::uint32_t coverage) {
@@ -73,7 +75,8 @@ std::string TextPainter::fit(std::string_view utf8, float pixels, float most, We
   return std::string(utf8.substr(0, kept)) + std::string(kEllipsis);
 }
 
-std::vector<std::string> TextPainter::wrap(std::string_view utf8, float pixels, float most, std::size_t lines) {
+std::vector<std::string> TextPainter::wrap(std::string_view utf8, float pixels, float most,
+                                           std::size_t lines) {
   std::vector<std::string> wrapped(1);
   while (!utf8.empty()) {
     const std::size_t end = std::min(utf8.find(' '), utf8.size());
@@ -91,8 +94,8 @@ std::vector<std::string> TextPainter::wrap(std::string_view utf8, float pixels, 
   return wrapped;
 }
 
-void TextPainter::write(Picture& picture, std::string_view utf8, float x, float y, float pixels, Ink ink, Align align,
-                        Weight weight) {
+void TextPainter::write(Picture& picture, std::string_view utf8, float x, float y, float pixels, Ink ink,
+                        Align align, Weight weight) {
   const std::uint32_t size = whole(pixels);
   if (align != Align::kLeft) x -= width(utf8, pixels, weight) * (align == Align::kCentre ? 0.5F : 1.0F);
   const int baseLine = static_cast<int>(std::lround(y + fonts_->capHeight(size, weight) / 2));
@@ -112,19 +115,23 @@ std::shared_ptr<const Picture> TextPainter::label(std::string_view name, Ink bor
   constexpr auto kHigh = static_cast<float>(kLabelHeight);
   drawRounded(*picture, 0, 0, wide, kHigh, kHigh / 2, {0x14, 0x16, 0x1b, 0xd8});
   drawRounded(*picture, 1, 1, wide - 2, kHigh - 2, kHigh / 2 - 1, border, 4);
-  write(*picture, text, wide / 2, kHigh / 2, kLabelPixels, {0xf4, 0xf2, 0xee, 255}, Align::kCentre, Weight::kBold);
+  write(*picture, text, wide / 2, kHigh / 2, kLabelPixels, {0xf4, 0xf2, 0xee, 255}, Align::kCentre,
+        Weight::kBold);
   touch(*picture);
   return picture;
 }
 
-void drawRounded(Picture& picture, float left, float top, float width, float height, float radius, Ink ink, float line) {
+void drawRounded(Picture& picture, float left, float top, float width, float height, float radius, Ink ink,
+                 float line) {
   const float halfWidth = width / 2, halfHeight = height / 2;
   const int firstRow = std::max(0, static_cast<int>(std::floor(top)));
   const int lastRow = std::min(static_cast<int>(picture.height), static_cast<int>(std::ceil(top + height)));
   const int first = std::max(0, static_cast<int>(std::floor(left)));
   const int last = std::min(static_cast<int>(picture.width), static_cast<int>(std::ceil(left + width)));
   for (int row = firstRow; row < lastRow; ++row) {
-    std::uint8_t* texel = &picture.texels[4 * (static_cast<std::size_t>(row) * picture.width + static_cast<std::size_t>(first))];
+    std::uint8_t* texel =
+        &picture
+             .texels[4 * (static_cast<std::size_t>(row) * picture.width + static_cast<std::size_t>(first))];
     for (int column = first; column < last; ++column, texel += 4) {
       const float x = static_cast<float>(column) + 0.5F - left - halfWidth;
       const float y = static_cast<float>(row) + 0.5F - top - halfHeight;

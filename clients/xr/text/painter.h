@@ -23,8 +23,8 @@ enum class Align { kLeft, kCentre, kRight };
 // Not thread-safe.
 class TextPainter {
  public:
-  // Uses the font file, or the sans-serif fonts of the system if `fontFile` is "". Throws std::runtime_error that says
-  // what to install if there is no font.
+  // Uses the font file, or the sans-serif fonts of the system if `fontFile` is "". Throws std::runtime_error
+  // that says what to install if there is no font.
   explicit TextPainter(const std::string& fontFile = "");
   ~TextPainter();
   TextPainter(const TextPainter&) = delete;
@@ -33,15 +33,15 @@ class TextPainter {
   const std::string& fontFile() const { return fontFile_; }
   // Width of a text in pixels. `pixels` is the size of the font.
   float width(std::string_view utf8, float pixels, Weight weight = Weight::kRegular);
-  // Lines of at most `most` pixels. A word that is wider stands alone, and is cut when it is drawn. At most `lines`
-  // lines; the last one ends with an ellipsis if there is more.
+  // Lines of at most `most` pixels. A word that is wider stands alone, and is cut when it is drawn. At most
+  // `lines` lines; the last one ends with an ellipsis if there is more.
   std::vector<std::string> wrap(std::string_view utf8, float pixels, float most, std::size_t lines);
   // The text, or its start with an ellipsis if it is wider than `most` pixels.
   std::string fit(std::string_view utf8, float pixels, float most, Weight weight = Weight::kRegular);
-  // Draws a text at `x`, vertically centred at `y` on the height of capital letters. Characters that no font has are
-  // drawn as boxes; malformed UTF-8 as U+FFFD.
-  void write(Picture& picture, std::string_view utf8, float x, float y, float pixels, Ink ink, Align align = Align::kLeft,
-             Weight weight = Weight::kRegular);
+  // Draws a text at `x`, vertically centred at `y` on the height of capital letters. Characters that no font
+  // has are drawn as boxes; malformed UTF-8 as U+FFFD.
+  void write(Picture& picture, std::string_view utf8, float x, float y, float pixels, Ink ink,
+             Align align = Align::kLeft, Weight weight = Weight::kRegular);
 
   // A name in a pill with a border of this colour, for a label in space.
   std::shared_ptr<const Picture> label(std::string_view name, Ink border);
@@ -53,8 +53,10 @@ class TextPainter {
 
 // Makes a picture of this size transparent, and keeps its memory.
 void clear(Picture& picture, std::uint32_t width, std::uint32_t height);
-// Draws a rectangle with round corners over the picture. `line` is the width of an outline; 0 fills the rectangle.
-void drawRounded(Picture& picture, float left, float top, float width, float height, float radius, Ink ink, float line = 0);
+// Draws a rectangle with round corners over the picture. `line` is the width of an outline; 0 fills the
+// rectangle.
+void drawRounded(Picture& picture, float left, float top, float width, float height, float radius, Ink ink,
+                 float line = 0);
 // Gives the picture a new revision.
 void touch(Picture& picture);
 
