@@ -24,12 +24,15 @@ const View front = look({0.3f, 1.3f, 2.2f}, {0, 1, 0});
 
 class RendererCostTest : public testing::Test {
  protected:
+  // Drivers compile shaders once per device.
+  static void SetUpTestSuite() { device_ = std::make_unique<tests::Device>(); }
+  static void TearDownTestSuite() { device_.reset(); }
   void SetUp() override {
-    if (!device_.get()) GTEST_SKIP() << "no Vulkan device: " << device_.why();
+    if (!device_->get()) GTEST_SKIP() << "no Vulkan device: " << device_->why();
   }
-  const GraphicsDevice& device() const { return device_.graphics(); }
+  const GraphicsDevice& device() const { return device_->graphics(); }
 
-  tests::Device device_;
+  static inline std::unique_ptr<tests::Device> device_;
 };
 
 // Stage with 10,000 vertices, two hands, and three other people.

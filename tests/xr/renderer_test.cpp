@@ -33,13 +33,16 @@ bool isOnEdge(std::uint32_t node) {
 
 class RendererTest : public testing::Test {
  protected:
+  // Drivers compile shaders once per device.
+  static void SetUpTestSuite() { device_ = std::make_unique<tests::Device>(); }
+  static void TearDownTestSuite() { device_.reset(); }
   void SetUp() override {
-    if (!device_.get()) GTEST_SKIP() << "no Vulkan device: " << device_.why();
+    if (!device_->get()) GTEST_SKIP() << "no Vulkan device: " << device_->why();
     messages_ = validationMessages();
   }
   void TearDown() override { EXPECT_EQ(validationMessages(), messages_) << "messages of validation"; }
 
-  const GraphicsDevice& device() const { return device_.graphics(); }
+  const GraphicsDevice& device() const { return device_->graphics(); }
   static void keep(const Drawn& drawn, const std::string& name, std::uint32_t views = 1) {
     const char* folder = std::getenv("CLOTHSTREAM_XR_PICTURES");
     if (folder == nullptr) return;
@@ -54,7 +57,7 @@ class RendererTest : public testing::Test {
     return without;
   }
 
-  tests::Device device_;
+  static inline std::unique_ptr<tests::Device> device_;
   std::uint64_t messages_ = 0;
   const std::array<View, 1> front_{look({0.3f, 1.3f, 2.2f}, {0, 1, 0})};
 };

@@ -78,12 +78,15 @@ class Spectator {
 
 class ScenePictureTest : public testing::Test {
  protected:
+  // Drivers compile shaders once per device.
+  static void SetUpTestSuite() { device_ = std::make_unique<tests::Device>(); }
+  static void TearDownTestSuite() { device_.reset(); }
   void SetUp() override {
-    if (!device_.get()) GTEST_SKIP() << "no Vulkan device: " << device_.why();
+    if (!device_->get()) GTEST_SKIP() << "no Vulkan device: " << device_->why();
   }
   std::string address() { return "127.0.0.1:" + std::to_string(server_.portIn(server_.lineWith("page"))); }
 
-  tests::Device device_;
+  static inline std::unique_ptr<tests::Device> device_;
   ServerProcess server_{{"--port", "0", "--grpc-port", "0", "--scene", "solver_mass_spring"}};
   TextPainter painter_;
 };
@@ -102,7 +105,7 @@ TEST_F(ScenePictureTest, ClothCoversThePixelsOfItsVertices) {
   EXPECT_EQ(stage.clothNodeCount, 1024U);
   stage.solids.clear();  // so that every vertex is seen, from the one side or the other
   constexpr std::uint32_t kSize = 320;
-  Drawn drawn(device_.graphics(), kSize, 1);
+  Drawn drawn(device_->graphics(), kSize, 1);
   const Eigen::Vector3f eye = stage.centre + stage.radius * Eigen::Vector3f(0.6f, 1.9f, 1.4f);
   const std::array<View, 1> view{look(eye, stage.centre)};
   drawn.draw(stage, view);
