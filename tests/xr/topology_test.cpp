@@ -92,7 +92,7 @@ TEST(Fabrics, UnknownMaterialsLookLikeCotton) {
 }
 
 TEST(Solids, HeadWithKnownOrientationHasAVisor) {
-  cs_collider head;
+  cs_collider head{};
   head.shape = CS_SHAPE_SPHERE;
   head.name = "2147483712";  // CS_HEAD_ID
   head.participant_id = 7;
@@ -112,7 +112,7 @@ TEST(Solids, HeadWithKnownOrientationHasAVisor) {
 }
 
 TEST(Solids, YieldingCollidersAreRed) {
-  cs_collider ball;
+  cs_collider ball{};
   ball.shape = CS_SHAPE_SPHERE;
   ball.name = "1";
   ball.participant_id = 7;
