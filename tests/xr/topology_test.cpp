@@ -112,7 +112,7 @@ TEST(Solids, HeadWithKnownOrientationHasAVisor) {
 }
 
 TEST(Solids, YieldingCollidersAreRed) {
-  cs_collider ball;
+  cs_collider ball{};
   ball.shape = CS_SHAPE_SPHERE;
   ball.name = "1";
   ball.participant_id = 7;

@@ -57,5 +57,5 @@ void main() {
   }
   if (!gl_FrontFacing) m.colour *= part.sheen.z;
   m.colour = min(m.colour, vec3(0.95));
-  outColour = written(toneMapped(shade(m, inPlace, shaded, flatNormal, eye)), 1.0);
+  outColour = written(toneMapped(shade(m, inPlace, shaded, normal, eye)), 1.0);
 }
