@@ -17,13 +17,12 @@ const kDesktop = { width: 1280, height: 800 };
 const kMoving = { width: 560, height: 400 };
 const kSwing = 5; // s, period of the collider's motion
 const kScene = { width: 1120, height: 960 };
-const kMiddle = { x: 100, y: 160, width: 720, height: 600 };
-// When a scene shows what it is for (s), the part of the page where that is (pixels), and how far the mouse wheel turns
-// before, away from the scene (pixels).
+const kMiddle = { x: 100, y: 260, width: 720, height: 600 };
+// When a scene shows what it is for (s), and the part of the page where that is (pixels).
 const kPictures = [
   { scene: "dress", second: 4, part: { x: 0, y: 120, width: 640, height: 560 } },
   { scene: "gown", second: 2.8, part: { x: 0, y: 120, width: 640, height: 560 } },
-  { scene: "balloon", second: 0.5, part: kMiddle, zoom: 600 },
+  { scene: "balloon", second: 0.5, part: { x: 160, y: 160, width: 660, height: 600 } },
   { scene: "cushion", second: 4.5, part: kMiddle },
 ];
 const kStart = 6.25; // s, after the first swing
@@ -75,10 +74,8 @@ async function playSlowly(recording, from, viewport, use) {
   }
 }
 
-async function pictureOf({ scene, second, part, zoom = 0 }) {
+async function pictureOf({ scene, second, part }) {
   await playSlowly(await recorded(scene, second + 1), second, kScene, async (page) => {
-    await page.mouse.move(kMiddle.x, kMiddle.y);
-    await page.mouse.wheel(0, zoom);
     await page.waitForFunction((time) => window.clothstream.playback.position >= time, second);
     await page.screenshot({ path: join(kDocs, "images", `${scene}.png`), clip: part });
   });
