@@ -17,7 +17,7 @@ const kDesktop = { width: 1280, height: 800 };
 const kMoving = { width: 560, height: 400 };
 const kSwing = 5; // s, period of the collider's motion
 const kScene = { width: 1120, height: 960 };
-const kMiddle = { x: 100, y: 260, width: 720, height: 600 };
+const kMiddle = { x: 100, y: 320, width: 720, height: 600 };
 // When a scene shows what it is for (s), and the part of the page where that is (pixels).
 const kPictures = [
   { scene: "dress", second: 4, part: { x: 0, y: 120, width: 640, height: 560 } },
