@@ -15,7 +15,7 @@ struct GLFWwindow;
 
 namespace clothstream::xr {
 
-// What the user has done since the last call of Window::poll().
+// Input of the user since the last call of Window::poll().
 struct MouseInput {
   Eigen::Vector2f place = Eigen::Vector2f::Zero();  // in the window: -1 to 1, to the right and up
   Eigen::Vector2f moved =

@@ -16,7 +16,7 @@
 
 namespace clothstream::xr {
 
-// What the panel shows. Filled by the program (panel_facts.h does so from a cs_client).
+// The panel shows these facts. The program fills them in (panel_facts.h does so from a cs_client).
 struct PanelFacts {
   struct Scene {
     std::string name;
@@ -44,7 +44,7 @@ struct PanelFacts {
   bool mayAct = false;        // Reset and Pause are enabled
   bool isPaused = false;
   bool canRecenter = true;  // else the button is left out (flat)
-  // What happened, and what to do; "" if all is well. They stand in front of everything else.
+  // They say what happened and what to do, and are "" if all is well. They stand in front of everything else.
   std::string trouble, advice;
   bool canRetry = false;  // adds a button "Try again" to the trouble
   std::string status;     // last line: a notice, or figures in short
@@ -53,7 +53,7 @@ struct PanelFacts {
 
 enum class PanelActionKind { kJoinScene, kReset, kPause, kContinue, kQuality, kRecenter, kRetry, kLeave };
 
-// What a press asks the program to do.
+// A press asks the program to do this.
 struct PanelAction {
   PanelActionKind kind = PanelActionKind::kReset;
   std::string scene{};        // kJoinScene
@@ -102,12 +102,12 @@ class Panel {
   // then.
   bool isHeld(std::size_t pointer) const { return presses_[pointer].has_value(); }
 
-  // What is shown: lines of text, and buttons.
+  // The panel shows these lines of text and buttons.
   const std::vector<PanelLine>& lines() const { return drawn_.lines; }
   const std::vector<PanelArea>& buttons() const { return drawn_.areas; }
 
  private:
-  // What a press of a button does.
+  // A press of a button does this.
   struct Effect {
     std::optional<PanelAction> action{};
     std::optional<PanelTab> tab{};

@@ -30,7 +30,7 @@ inline constexpr std::uint32_t kVulkanVersion = VK_API_VERSION_1_2;
 // Throws std::runtime_error with what to install if there is none.
 void openVulkanLoader();
 
-// What the renderer needs in addition to kVulkanVersion. No extensions at present.
+// The renderer needs these extensions in addition to kVulkanVersion; there are none at present.
 std::vector<const char*> requiredDeviceExtensions();
 
 // Reason why the renderer cannot use a device, as a sentence; "" if it can.

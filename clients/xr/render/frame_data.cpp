@@ -147,29 +147,28 @@ void FrameData::makeSolidIndices() {
                                VK_BUFFER_USAGE_INDEX_BUFFER_BIT);
 }
 
-void FrameData::bindBuffer(Slot& slot, std::uint32_t binding, VkBuffer buffer) const {
-  const VkDescriptorBufferInfo info{buffer, 0, VK_WHOLE_SIZE};
+void FrameData::bind(Slot& slot, std::uint32_t binding, const VkDescriptorBufferInfo* buffer,
+                     const VkDescriptorImageInfo* image) const {
   VkWriteDescriptorSet write{};
   write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
   write.dstSet = slot.set;
   write.dstBinding = binding;
   write.descriptorCount = 1;
   write.descriptorType = descriptorType(binding);
-  write.pBufferInfo = &info;
+  write.pBufferInfo = buffer;
+  write.pImageInfo = image;
   vkUpdateDescriptorSets(device_.device, 1, &write, 0, nullptr);
+}
+
+void FrameData::bindBuffer(Slot& slot, std::uint32_t binding, VkBuffer buffer) const {
+  const VkDescriptorBufferInfo info{buffer, 0, VK_WHOLE_SIZE};
+  bind(slot, binding, &info, nullptr);
 }
 
 void FrameData::bindImage(Slot& slot, std::uint32_t binding, VkImageView view, VkSampler sampler,
                           VkImageLayout layout) const {
   const VkDescriptorImageInfo info{sampler, view, layout};
-  VkWriteDescriptorSet write{};
-  write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-  write.dstSet = slot.set;
-  write.dstBinding = binding;
-  write.descriptorCount = 1;
-  write.descriptorType = descriptorType(binding);
-  write.pImageInfo = &info;
-  vkUpdateDescriptorSets(device_.device, 1, &write, 0, nullptr);
+  bind(slot, binding, nullptr, &info);
 }
 
 void FrameData::grow(Slot& slot, Buffer& buffer, std::uint32_t binding, VkDeviceSize bytes) const {

@@ -61,6 +61,8 @@ class FrameData {
   };
 
   void makeSolidIndices();
+  void bind(Slot& slot, std::uint32_t binding, const VkDescriptorBufferInfo* buffer,
+            const VkDescriptorImageInfo* image) const;
   void bindBuffer(Slot& slot, std::uint32_t binding, VkBuffer buffer) const;
   void bindImage(Slot& slot, std::uint32_t binding, VkImageView view, VkSampler sampler,
                  VkImageLayout layout) const;

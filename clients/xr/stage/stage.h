@@ -22,7 +22,7 @@ using Colour = Eigen::Vector3f;
 // Colour of 0xRRGGBB in sRGB encoding.
 Colour fromSrgb(std::uint32_t rgb);
 
-// What is seen where nothing is drawn.
+// This is seen where nothing is drawn.
 enum class Background : std::uint32_t {
   kRoom = 0,  // a floor that fades into a bright room; for VR
   kTransparent =
@@ -64,7 +64,7 @@ enum class SolidKind : std::uint32_t {
   kPlane = 2  // the half-space below y = 0 of its frame; drawn as a disk
 };
 
-// What a solid seems to be made of.
+// A solid seems to be made of this.
 enum class Substance : std::uint32_t {
   kPlain = 0,
   kCeramic = 1,
