@@ -233,11 +233,9 @@ void Headset::moveRoom(XrTime time) {
 }
 
 std::uint64_t Headset::displayUs(const XrFrameState& state, std::uint64_t nowUs) {
-  if (convertTime_) {
-    timespec time{};
-    check(convertTime_(instance_.get(), state.predictedDisplayTime, &time), "xrConvertTimeToTimespecTimeKHR");
+  timespec time{};
+  if (convertTime_ && XR_SUCCEEDED(convertTime_(instance_.get(), state.predictedDisplayTime, &time)))
     return DisplayClock::convertedUs(std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec, nowUs);
-  }
   return clock_.displayUs(state.predictedDisplayTime, state.predictedDisplayPeriod, nowUs);
 }
 
