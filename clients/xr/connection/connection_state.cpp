@@ -38,8 +38,10 @@ Trouble troubleOf(Step step, clothstream_result result, const std::string& text)
       return {"The server does not answer", reason + kAgain};
     case CLOTHSTREAM_REFUSED:
       if (step == Step::pairing)
-        return {"The server refused the pairing code",
-                reason + " Start again with --code and the six digits that the server shows now."};
+        return {"The server refused the pairing code", reason +
+                                                           " Start again with --code and the six digits that "
+                                                           "the server shows now, or without --code if it "
+                                                           "shows none."};
       if (step == Step::streaming) return {"The server ended the session", reason};
       return {"The server refused to let you in", reason};
     case CLOTHSTREAM_LOST:
