@@ -47,7 +47,7 @@ XrDebugUtilsMessengerCreateInfoEXT messengerInfo() {
           result,
           "No OpenXR runtime is active (" + name +
               "). Start SteamVR, Monado or WiVRn and make it the active runtime, or set XR_RUNTIME_JSON to "
-              "its manifest. Without a headset, use --flat.");
+              "its manifest. --verbose shows what was tried. Without a headset, use --flat.");
     case XR_ERROR_RUNTIME_FAILURE:
     case XR_ERROR_INITIALIZATION_FAILED:
     case XR_ERROR_INSTANCE_LOST:
