@@ -11,8 +11,10 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -355,6 +357,21 @@ class Life(WithMonado):
         self.assertEqual(self.find_visor(observer), visor)
         self.look("after_restart", after=5)
         self.end(client)
+
+    def test_ends_although_the_runtime_hangs(self):
+        self.start_server()
+        monado = self.start_monado()
+        for signals, status in ((1, 1), (2, 128 + signal.SIGTERM)):
+            client = self.start_client()
+            client.wait_for(FOCUSED)
+            monado.process.send_signal(signal.SIGSTOP)
+            client.ask_to_stop()
+            if signals == 2:
+                time.sleep(1)  # the runtime would have ended the session by now
+                client.ask_to_stop()
+            self.assertEqual(client.process.wait(30), status, client.tail())
+            monado.process.send_signal(signal.SIGCONT)
+        self.assertIn("The program is stopped: 10 s after a signal", (self.root.folder / "client.log").read_text())
 
     def test_server_is_killed_and_started_again(self):
         server = self.start_server()
