@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Joining, being refused and leaving, with a server and with a port on which nobody speaks.
+// Joining, refusals and leaving, with a server and with a silent port.
 #include "clients/xr/connection/connection.h"
 
 #include <chrono>

@@ -72,7 +72,7 @@ TEST_F(XrLimb, ControllerHasPriorityAndSwitchesBothWaysAtOnce) {
   EXPECT_TRUE(limb.isNew());
 }
 
-TEST_F(XrLimb, PressOfTheOtherKindIsANewOne) {
+TEST_F(XrLimb, PressAfterASwitchIsNew) {
   giveHand(sample, {0, 1, 0}, kClosed);
   update();
   giveController(sample, {1, 1, 0});

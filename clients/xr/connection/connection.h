@@ -67,8 +67,8 @@ class Connection {
   // Number of clients so far. Changes when acquire() gives another one.
   std::uint64_t clientNumber() const { return clientNumber_; }
 
-  // Reason why the user stays where they are although they have chosen another scene or quality, once; "" if
-  // there is none.
+  // Reason why the user stays where they are although they have chosen another scene or quality; "" if
+  // nothing was refused since the last call.
   std::string takeNotice() { return std::exchange(notice_, {}); }
   // Whether the options are not allowed, so that no attempt can succeed.
   bool isInvalid() const { return isInvalid_; }
