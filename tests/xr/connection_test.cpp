@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -95,15 +96,22 @@ TEST(XrConnection, SilentServerIsTriedAgain) {
 
 class XrConnectionWithServer : public testing::Test {
  protected:
-  void SetUp() override {
-    if (const tests::Device device; !device.get()) GTEST_SKIP() << "no Vulkan device: " << device.why();
-    server_.emplace(
+  // A server takes a second to start, most of which is its device.
+  static void SetUpTestSuite() {
+    const tests::Device device;
+    why_ = device.why();
+    if (!device.get()) return;
+    server_ = std::make_unique<ServerProcess>(
         std::vector<std::string>{"--port", "0", "--grpc-port", "0", "--scene", "solver_mass_spring"});
     address_ = "127.0.0.1:" + std::to_string(server_->portIn(server_->lineWith("page    http")));
   }
+  static void TearDownTestSuite() { server_.reset(); }
+  void SetUp() override {
+    if (!server_) GTEST_SKIP() << "no Vulkan device: " << why_;
+  }
 
-  std::optional<ServerProcess> server_;
-  std::string address_;
+  static inline std::unique_ptr<ServerProcess> server_;
+  static inline std::string address_, why_;
 };
 
 TEST_F(XrConnectionWithServer, RefusedChoiceLeavesTheUserInTheScene) {
