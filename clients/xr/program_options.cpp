@@ -186,7 +186,7 @@ std::optional<ProgramOptions> readOptions(int count, char** arguments, int& exit
     return std::nullopt;
   }
   options.headset.samples = options.flat.samples = samples;
-  options.headset.shadows = shadows;
+  options.headset.shadows = options.flat.shadows = shadows;
   return options;
 }
 

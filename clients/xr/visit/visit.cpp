@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "clients/xr/panel/panel_facts.h"
@@ -24,7 +23,9 @@ const Colour kRayColour = fromSrgb(0xE6A850);
 }  // namespace
 
 Visit::Visit(ConnectionOptions options, TextPainter& painter)
-    : connection_(std::move(options)), reader_(painter), panel_(painter) {}
+    : connection_(std::move(options)), reader_(painter), panel_(painter) {
+  facts_.status.reserve(256);
+}
 
 void Visit::frame(const InputSample& sample, std::uint64_t nowUs, std::uint64_t displayUs) {
   pulseCount_ = 0;
@@ -177,7 +178,7 @@ void Visit::readFacts(cs_client* client, std::uint64_t nowUs) {
     readPanelFacts(client, nowUs, facts_);
     const FrameTimes::Summary display = times_.summary(nowUs);
     if (display.frames > 0)
-      facts_.figures.push_back({"display", fmt::format("{:.0f} frames/s", display.framesPerSecond)});
+      facts_.figures.push_back({"display", FixedText::format("{:.0f} frames/s", display.framesPerSecond)});
   }
   facts_.quality = connection_.options().quality;
   if (!said_.empty() && nowUs - saidUs_ < kSaidFor) facts_.status = said_;
