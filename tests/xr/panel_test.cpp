@@ -29,7 +29,7 @@ class PanelTest : public testing::Test {
   PanelTest() { panel_.show(sampleFacts()); }
 
   const PanelArea* find(const std::string& text) const {
-    const auto at = std::ranges::find(panel_.buttons(), text, &PanelArea::text);
+    const auto at = std::ranges::find(panel_.buttons(), FixedText(text), &PanelArea::text);
     return at == panel_.buttons().end() ? nullptr : &*at;
   }
   // Ray to the middle of a button of a panel that stands in the room.
@@ -49,8 +49,9 @@ class PanelTest : public testing::Test {
     return panel_.point(0, at, false);
   }
   bool shows(const std::string& text) const {
-    return std::ranges::any_of(panel_.lines(),
-                               [&](const PanelLine& line) { return line.text.find(text) != line.text.npos; });
+    return std::ranges::any_of(panel_.lines(), [&](const PanelLine& line) {
+      return line.text.view().find(text) != std::string_view::npos;
+    });
   }
 
   TextPainter painter_;
@@ -180,7 +181,7 @@ TEST_F(PanelTest, EverythingIsWithinThePanel) {
       EXPECT_LE(area.top + area.height, panel_.height());
     }
     for (const PanelLine& line : panel_.lines())
-      EXPECT_LE(line.top + kPanelRow, kPanelHeight + 1e-4f) << line.text;
+      EXPECT_LE(line.top + kPanelRow, kPanelHeight + 1e-4f) << line.text.view();
   }
 }
 
@@ -215,6 +216,32 @@ TEST_F(PanelTest, PictureChangesOnlyWithWhatItShows) {
   panel_.point(0, hit(*find("Reset")), false);  // hovers
   panel_.finish();
   EXPECT_NE(panel_.quad(pose_).picture->revision, revision + 1);
+}
+
+// Texels of a picture that differ from those of an earlier one lie in its changes.
+TEST_F(PanelTest, PicturesSayWhereTheyDifferFromTheOneBefore) {
+  panel_.finish();
+  const Picture before = *panel_.quad(pose_).picture;
+  PanelFacts facts = sampleFacts();
+  facts.status = "61 frames/s";
+  panel_.show(facts);
+  panel_.finish();
+  const Picture& after = *panel_.quad(pose_).picture;
+  EXPECT_EQ(after.since, before.revision);
+  std::size_t changed = 0;
+  for (std::uint32_t y = 0; y < after.height; ++y)
+    for (std::uint32_t x = 0; x < after.width; ++x) {
+      const std::size_t at = 4 * (std::size_t{y} * after.width + x);
+      const bool isIn = std::ranges::any_of(after.changes, [&](const TexelRect& rect) {
+        return x >= rect.left && x < rect.right && y >= rect.top && y < rect.bottom;
+      });
+      changed += isIn;
+      if (isIn) continue;
+      ASSERT_TRUE(std::equal(&after.texels[at], &after.texels[at] + 4, &before.texels[at])) << x << ' ' << y;
+    }
+  EXPECT_GT(changed, 0U);
+  // A digit is less than a hundredth of the panel.
+  EXPECT_LT(changed, std::size_t{after.width} * after.height / 100);
 }
 
 TEST_F(PanelTest, QuadHangsFromThePose) {

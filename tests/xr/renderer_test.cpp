@@ -304,6 +304,65 @@ TEST_F(RendererTest, PanelAndNamesShowTheirTexels) {
   EXPECT_NEAR(drawn.at(128, 90).green, 160, 2);
 }
 
+TEST_F(RendererTest, ChangesOfThePanelGiveTheSamePictureAsAllOfIt) {
+  Drawn one(device(), 256, 1), other(device(), 256, 1);
+  Stage stage = bare(sampleStage(4));
+  Picture before, after;
+  clear(before, 300, 400);
+  drawRounded(before, 0, 0, 300, 400, 20, {200, 40, 40, 255});
+  after = before;
+  touch(before);
+  drawRounded(after, 31, 45, 77, 40, 5, {40, 40, 200, 255});
+  drawRounded(after, 200, 333, 99, 60, 5, {40, 200, 40, 255});
+  touch(after);
+  findChanges(before, after);
+  ASSERT_GT(after.changes.size(), 2U);
+  const std::array<View, 1> view{look({0, 1, 2}, {0, 1, 0})};
+  stage.panel = {.visible = true,
+                 .pose = {{0, 1, 0}, Eigen::Quaternionf::Identity()},
+                 .size = {0.75f, 1},
+                 .picture = &before};
+  one.draw(stage, view);
+  const std::vector<std::uint8_t> first = one.pixels();
+  stage.panel.picture = &after;
+  one.draw(stage, view);
+  EXPECT_NE(one.pixels(), first);
+  other.draw(stage, view);  // has not seen the picture before: copies everything
+  EXPECT_EQ(one.pixels(), other.pixels());
+  // Without changes there is nothing to copy.
+  Picture same = after;
+  touch(same);
+  findChanges(after, same);
+  stage.panel.picture = &same;
+  one.draw(stage, view);
+  EXPECT_EQ(one.pixels(), other.pixels());
+}
+
+TEST_F(RendererTest, MoreNamesThanLayersDoNotDisplaceEachOther) {
+  Drawn drawn(device(), 128, 1);
+  Stage stage = bare(sampleStage(4));
+  TextPainter painter;
+  for (std::uint64_t id = 1; id <= 40; ++id)
+    stage.labels.push_back(
+        {id,
+         {0.1f * static_cast<float>(id % 8) - 0.4f, 0.6f + 0.1f * static_cast<float>(id / 8), 0},
+         painter.label(std::to_string(id), {})});
+  for (int frame = 0; frame < 12; ++frame) drawn.draw(stage, front_);  // four names are copied in each
+  const std::vector<std::uint8_t> settled = drawn.pixels();
+  for (int frame = 0; frame < 3; ++frame) {
+    drawn.draw(stage, front_);
+    EXPECT_EQ(drawn.pixels(), settled);
+  }
+  // Layers of names that are gone are used again.
+  stage.labels.erase(stage.labels.begin(), stage.labels.begin() + 10);
+  Drawn other(device(), 128, 1);
+  for (int frame = 0; frame < 12; ++frame) {
+    drawn.draw(stage, front_);
+    other.draw(stage, front_);
+  }
+  EXPECT_EQ(drawn.pixels(), other.pixels());
+}
+
 TEST_F(RendererTest, NormalsOfTheStreamReplaceComputedOnes) {
   Drawn drawn(device(), 64, 1);
   Stage stage = sampleStage(10);

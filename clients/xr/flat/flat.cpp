@@ -80,7 +80,8 @@ struct Flat::Parts {
   Parts(const FlatOptions& flatOptions, Visit& shown);
   ~Parts();
 
-  void makeRenderer(VkFormat format, VkExtent2D largest);
+  void makeRenderer(VkFormat format, VkExtent2D largestTarget);
+  void upload();
   void readInput(const MouseInput& mouse, float aspect);
   void placeCamera(float aspect);
   // Makes the stage, and fills in the view.
@@ -105,6 +106,7 @@ struct Flat::Parts {
   std::uint64_t uploaded = 0, aimedAt = 0;
   std::uint32_t frames = 0, pictures = 0;
   Pose aimedFrom;
+  VkExtent2D largest{};  // of the renderer
   Clock::time_point start = Clock::now(), next = start, shownSince = start;
   MouseInput mouse;
   float windowAspect = 1;
@@ -138,6 +140,7 @@ Flat::Parts::Parts(const FlatOptions& flatOptions, Visit& shown) : options(flatO
     makeRenderer(VK_FORMAT_R8G8B8A8_SRGB, size);
     options.frames = std::max(1U, options.frames);
   }
+  commands = std::make_unique<FrameCommands>(device->get());
   options.every = std::max(1U, options.every);
   spdlog::info("{} draws", device->name());
   // The first head stands before the scene; the camera follows when the scene is there.
@@ -153,12 +156,15 @@ Flat::Parts::~Parts() {
   device.reset();
 }
 
-void Flat::Parts::makeRenderer(VkFormat format, VkExtent2D largest) {
+void Flat::Parts::makeRenderer(VkFormat format, VkExtent2D largestTarget) {
+  renderer.reset();
+  largest = largestTarget;
+  uploaded = 0;
   renderer = std::make_unique<Renderer>(
       device->get(), RendererOptions{.colour = format,
                                      .samples = samplesOf(device->get().physical, options.samples),
-                                     .largest = largest});
-  commands = std::make_unique<FrameCommands>(device->get());
+                                     .largest = largest,
+                                     .shadows = options.shadows});
 }
 
 // The mouse as a controller with a ray.
@@ -214,6 +220,12 @@ bool Flat::Parts::isReady() const {
   return hasScene || visit.connection().phase() == Phase::refused || Clock::now() - start > kLongestWait;
 }
 
+void Flat::Parts::upload() {
+  if (visit.stage().topology == uploaded) return;
+  renderer->upload(visit.stage());
+  uploaded = visit.stage().topology;
+}
+
 void Flat::Parts::record(VkCommandBuffer buffer, const Target& target) {
   renderer->record(buffer, target, {&view, 1}, visit.stage());
 }
@@ -230,14 +242,13 @@ bool Flat::Parts::stepWindow() {
   const double begin = threadSeconds();
   makeStage(windowAspect);
   const double staged = threadSeconds();
-  if (visit.stage().topology != uploaded) {
-    renderer->upload(visit.stage());
-    uploaded = visit.stage().topology;
-  }
   const VkCommandBuffer buffer = commands->begin();
   bool forgets = false;
   const Target target = window->acquire(commands->current(), forgets);
   if (forgets) renderer->forgetTargets();
+  if (target.size.width > largest.width || target.size.height > largest.height)
+    makeRenderer(window->format(), window->largest());
+  upload();
   if (target.colour == VK_NULL_HANDLE) {
     commands->submit();
     std::this_thread::sleep_for(kFrameTime);
@@ -261,10 +272,7 @@ bool Flat::Parts::stepPictures() {
   makeStage(aspect);
   const double staged = threadSeconds();
   if (!isReady()) return !visit.leaves();
-  if (visit.stage().topology != uploaded) {
-    renderer->upload(visit.stage());
-    uploaded = visit.stage().topology;
-  }
+  upload();
   const VkCommandBuffer buffer = commands->begin();
   const double drawing = threadSeconds();
   record(buffer, offscreen->target());

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "clients/xr/render/renderer.h"
 #include "clients/xr/visit/visit.h"
 
 namespace clothstream::xr {
@@ -18,6 +19,7 @@ struct FlatOptions {
   std::uint32_t every = 1;   // of the frames, each n-th is written to a file
   std::uint32_t width = 1280, height = 800;
   std::uint32_t samples = 4;  // per pixel: 1, 2, 4 or 8
+  ShadowDetail shadows = ShadowDetail::kFull;
   bool showsPanel = true;
 };
 

@@ -90,8 +90,6 @@ void Window::open(const GraphicsDevice& device) {
       largest_.height = std::max(largest_.height, static_cast<std::uint32_t>(mode->height));
     }
   makeSwapchain();
-  largest_.width = std::max(largest_.width, size_.width);
-  largest_.height = std::max(largest_.height, size_.height);
 }
 
 void Window::close() {
@@ -114,8 +112,7 @@ void Window::makeSwapchain() {
     glfwGetFramebufferSize(window_, &width, &height);
     size_ = {static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
   }
-  if (largest_.width > 0 && !images_.empty())
-    size_ = {std::min(size_.width, largest_.width), std::min(size_.height, largest_.height)};
+  largest_ = {std::max(largest_.width, size_.width), std::max(largest_.height, size_.height)};
   if (size_.width == 0 || size_.height == 0) return;
   VkSwapchainCreateInfoKHR info{};
   info.sType = VK_STRUCTURE_TYPE_SWAPCHAIN_CREATE_INFO_KHR;

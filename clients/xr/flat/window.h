@@ -41,6 +41,7 @@ class Window {
   // Ends the connection. Call before the device is destroyed.
   void close();
   VkFormat format() const { return format_; }
+  // Largest size of targets. It grows if the window becomes larger than all screens.
   VkExtent2D largest() const { return largest_; }
 
   // Reads the mouse. Returns false if the window is to be closed.

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include <fmt/format.h>
-
 namespace clothstream::xr {
 namespace {
 
@@ -14,12 +12,13 @@ constexpr float kLabelPart = 0.26F;   // of the width, for a text on the left of
 constexpr float kPokeDepth = 0.03F;   // m behind the panel at which a finger no longer presses
 constexpr std::size_t kListRows = 7;  // of one page
 constexpr std::size_t kFigureRows = 10;
+constexpr std::size_t kStatusBytes = 256;  // of memory for the status, which seldom has more
 
 constexpr std::array<const char*, 4> kTabs{"Scenes", "People", "Quality", "Figures"};
 constexpr std::array<const char*, 4> kQualities{"Full", "Half", "Quarter", "Coarsest"};
 
-std::string spaced(std::string name) {
-  std::ranges::replace(name, '_', ' ');
+FixedText spaced(FixedText name) {
+  name.replace('_', ' ');
   return name;
 }
 
@@ -34,7 +33,16 @@ Eigen::Vector2f placeOf(const Eigen::Vector3f& local) {
 
 }  // namespace
 
-Panel::Panel(TextPainter& painter) : painter_(painter), drawing_(painter.fontFile()) {}
+Panel::Panel(TextPainter& painter) : painter_(painter), drawing_(painter.fontFile()) {
+  for (const float size : {kTitleSize, kTextSize}) painter_.warm(pixelsOf(size), Weight::kRegular);
+  facts_.status.reserve(kStatusBytes);
+  drawn_.lines.reserve(kPanelLines);
+  drawn_.areas.reserve(kPanelAreas);
+  areasBefore_.reserve(kPanelAreas);
+  effects_.reserve(kPanelAreas);
+  items_.reserve(kPanelAreas);
+  wrapped_.reserve(kPanelLines);
+}
 
 void Panel::show(const PanelFacts& facts) {
   if (!isEmpty_ && facts == facts_) return;
@@ -54,7 +62,7 @@ PanelQuad Panel::quad(const Pose& pose) {
 }
 
 void Panel::layOut() {
-  const std::vector<PanelArea> before = std::move(drawn_.areas);
+  std::swap(areasBefore_, drawn_.areas);
   drawn_.lines.clear();
   drawn_.areas.clear();
   effects_.clear();
@@ -66,7 +74,7 @@ void Panel::layOut() {
     layOutTab(top);
   drawn_.height = std::min(top + kPanelMargin, kPanelHeight);
   // Buttons that are elsewhere now are not those that were pointed at.
-  if (before != drawn_.areas) {
+  if (areasBefore_ != drawn_.areas) {
     drawn_.hovered.fill(-1);
     for (std::optional<int>& press : presses_)
       if (press) press = -1;
@@ -77,82 +85,87 @@ void Panel::layOut() {
 void Panel::layOutTrouble(float& top) {
   addText(top, facts_.trouble, 3, true);
   addText(top, facts_.advice, 6, false);
-  std::vector<Item> buttons;
-  if (facts_.canRetry)
-    buttons.push_back({.text = "Try again", .effect = {.action = PanelAction{PanelActionKind::kRetry}}});
-  buttons.push_back({.text = "Leave", .effect = {.action = PanelAction{PanelActionKind::kLeave}}});
-  addButtons(top, buttons);
+  items_.clear();
+  if (facts_.canRetry) items_.push_back({.text = "Try again", .effect = {.action = PanelActionKind::kRetry}});
+  items_.push_back({.text = "Leave", .effect = {.action = PanelActionKind::kLeave}});
+  addButtons(top, items_);
 }
 
 void Panel::layOutTab(float& top) {
-  std::vector<Item> tabs;
+  items_.clear();
   for (std::uint32_t i = 0; i < kTabs.size(); ++i)
-    tabs.push_back({.text = kTabs[i],
-                    .isChosen = static_cast<PanelTab>(i) == tab_,
-                    .effect = {.tab = static_cast<PanelTab>(i)}});
-  addButtons(top, tabs);
-  std::vector<Item> items;
+    items_.push_back({.text = kTabs[i],
+                      .isChosen = static_cast<PanelTab>(i) == tab_,
+                      .effect = {.kind = Effect::Kind::kTab, .value = i}});
+  addButtons(top, items_);
+  items_.clear();
   switch (tab_) {
-    case PanelTab::kScenes: {
-      const PanelActionKind pause = facts_.isPaused ? PanelActionKind::kContinue : PanelActionKind::kPause;
-      addButtons(top, {{.text = "Reset",
-                        .isEnabled = facts_.mayAct,
-                        .effect = {.action = PanelAction{PanelActionKind::kReset}}},
-                       {.text = facts_.isPaused ? "Continue" : "Pause",
-                        .isEnabled = facts_.mayAct,
-                        .effect = {.action = PanelAction{pause}}}});
-      for (const PanelFacts::Scene& scene : facts_.scenes)
-        items.push_back({.text = spaced(scene.name),
-                         .detail = fmt::format("{} {}", scene.participants,
-                                               scene.participants == 1 ? "person" : "people"),
-                         .isChosen = scene.name == facts_.scene,
-                         .effect = {.action = PanelAction{PanelActionKind::kJoinScene, scene.name}}});
-      addList(top, kListRows, items, true);
+    case PanelTab::kScenes:
+      layOutScenes(top);
       break;
-    }
     case PanelTab::kPeople:
       for (const PanelFacts::Person& person : facts_.people)
-        items.push_back(
-            {.text = person.isSelf ? person.name + " (you)" : person.name, .detail = person.detail});
-      addList(top, kListRows + 1, items, false);
+        items_.push_back(
+            {.text = person.isSelf ? FixedText::format("{} (you)", person.name.view()) : person.name,
+             .detail = person.detail});
+      addList(top, kListRows + 1, items_, false);
       break;
     case PanelTab::kQuality:
       addText(top, "Best quality of your stream", 1, false);
       for (std::uint32_t i = 0; i < kQualities.size(); ++i)
-        items.push_back({.text = kQualities[i],
-                         .isChosen = i == facts_.quality,
-                         .effect = {.action = PanelAction{PanelActionKind::kQuality, "", i}}});
-      addButtons(top, items);
+        items_.push_back({.text = kQualities[i],
+                          .isChosen = i == facts_.quality,
+                          .effect = {.action = PanelActionKind::kQuality, .value = i}});
+      addButtons(top, items_);
       addText(top, "A change joins the scene again.", 1, false);
       break;
     case PanelTab::kFigures:
       for (const PanelFacts::Figure& figure : facts_.figures)
-        items.push_back({.text = figure.name, .detail = figure.value});
-      addList(top, kFigureRows, items, false);
+        items_.push_back({.text = figure.name, .detail = figure.value});
+      addList(top, kFigureRows, items_, false);
       break;
   }
-  std::vector<Item> last;
+  items_.clear();
   if (facts_.canRecenter)
-    last.push_back(
-        {.text = "Place before me", .effect = {.action = PanelAction{PanelActionKind::kRecenter}}});
-  last.push_back({.text = "Leave", .effect = {.action = PanelAction{PanelActionKind::kLeave}}});
-  addButtons(top, last);
+    items_.push_back({.text = "Place before me", .effect = {.action = PanelActionKind::kRecenter}});
+  items_.push_back({.text = "Leave", .effect = {.action = PanelActionKind::kLeave}});
+  addButtons(top, items_);
   // Last, so that a long text moves no button.
   const float rest = (kPanelHeight - kPanelMargin - top - kPanelRow) / (kPanelRow * kLineHeight);
   addText(top, facts_.status, rest < 0 ? 0 : static_cast<std::size_t>(rest) + 1, false);
 }
 
-void Panel::addText(float& top, const std::string& text, std::size_t most, bool isStrong) {
-  if (most == 0) return;
-  const float pixels = (isStrong ? kTitleSize : kTextSize) * kPanelRow * kPanelPixelsPerMetre;
-  const float room = kInner * kPanelPixelsPerMetre * (isStrong ? 0.94F : 1);  // bold letters are wider
-  const std::vector<std::string> lines = painter_.wrap(text, pixels, room, most);
-  for (std::size_t i = 0; i < lines.size(); ++i)
-    drawn_.lines.push_back({top + static_cast<float>(i) * kPanelRow * kLineHeight, lines[i], "", isStrong});
-  top += kPanelRow * (1 + static_cast<float>(lines.size() - 1) * kLineHeight);
+void Panel::layOutScenes(float& top) {
+  const PanelActionKind pause = facts_.isPaused ? PanelActionKind::kContinue : PanelActionKind::kPause;
+  items_.push_back(
+      {.text = "Reset", .isEnabled = facts_.mayAct, .effect = {.action = PanelActionKind::kReset}});
+  items_.push_back({.text = facts_.isPaused ? "Continue" : "Pause",
+                    .isEnabled = facts_.mayAct,
+                    .effect = {.action = pause}});
+  addButtons(top, items_);
+  items_.clear();
+  for (std::uint32_t i = 0; i < facts_.scenes.size(); ++i) {
+    const PanelFacts::Scene& scene = facts_.scenes[i];
+    items_.push_back({.text = spaced(scene.name),
+                      .detail = FixedText::format("{} {}", scene.participants,
+                                                  scene.participants == 1 ? "person" : "people"),
+                      .isChosen = scene.name == FixedText(facts_.scene),
+                      .effect = {.action = PanelActionKind::kJoinScene, .value = i}});
+  }
+  addList(top, kListRows, items_, true);
 }
 
-void Panel::addButtons(float& top, const std::vector<Item>& items, float left) {
+void Panel::addText(float& top, const std::string& text, std::size_t most, bool isStrong) {
+  if (most == 0) return;
+  const float room = kInner * kPanelPixelsPerMetre * (isStrong ? 0.94F : 1);  // bold letters are wider
+  painter_.wrap(text, pixelsOf(isStrong ? kTitleSize : kTextSize), room, most, wrapped_);
+  for (std::size_t i = 0; i < wrapped_.size(); ++i)
+    drawn_.lines.push_back(
+        {top + static_cast<float>(i) * kPanelRow * kLineHeight, wrapped_[i], "", isStrong});
+  top += kPanelRow * (1 + static_cast<float>(wrapped_.size() - 1) * kLineHeight);
+}
+
+void Panel::addButtons(float& top, std::span<const Item> items, float left) {
   const float width = (kPanelWidth - kPanelMargin - left + kPanelGap) / static_cast<float>(items.size());
   for (std::size_t i = 0; i < items.size(); ++i) {
     drawn_.areas.push_back({.left = left + static_cast<float>(i) * width,
@@ -168,7 +181,7 @@ void Panel::addButtons(float& top, const std::vector<Item>& items, float left) {
   top += kPanelRow;
 }
 
-void Panel::addList(float& top, std::size_t most, const std::vector<Item>& items, bool areButtons) {
+void Panel::addList(float& top, std::size_t most, std::span<const Item> items, bool areButtons) {
   const bool hasPages = items.size() > most;
   const std::size_t rows = hasPages ? most - 1 : items.size();
   const std::size_t pages = hasPages ? (items.size() + rows - 1) / rows : 1;
@@ -176,18 +189,20 @@ void Panel::addList(float& top, std::size_t most, const std::vector<Item>& items
   const std::size_t first = page_ * rows;
   for (std::size_t i = first; i < std::min(first + rows, items.size()); ++i) {
     if (areButtons) {
-      addButtons(top, {items[i]});
+      addButton(top, items[i]);
     } else {
       drawn_.lines.push_back({top, items[i].text, items[i].detail, false});
       top += kPanelRow;
     }
   }
   if (!hasPages) return;
-  drawn_.lines.push_back({top, fmt::format("{} of {}", page_ + 1, pages), "", false});
-  addButtons(top,
-             {{.text = "Back", .isEnabled = page_ > 0, .effect = {.page = page_ - 1}},
-              {.text = "More", .isEnabled = page_ + 1 < pages, .effect = {.page = page_ + 1}}},
-             kPanelMargin + kLabelPart * kInner);
+  drawn_.lines.push_back({top, FixedText::format("{} of {}", page_ + 1, pages), "", false});
+  const std::array<Item, 2> others{
+      {{.text = "Back", .isEnabled = page_ > 0, .effect = {.kind = Effect::Kind::kPage, .value = page_ - 1}},
+       {.text = "More",
+        .isEnabled = page_ + 1 < pages,
+        .effect = {.kind = Effect::Kind::kPage, .value = page_ + 1}}}};
+  addButtons(top, others, kPanelMargin + kLabelPart * kInner);
 }
 
 std::optional<PanelHit> Panel::hit(const Pose& pose, const Eigen::Vector3f& origin,
@@ -241,12 +256,21 @@ std::optional<PanelAction> Panel::poke(std::size_t pointer, const Pose& pose, co
 std::optional<PanelAction> Panel::press(int button) {
   if (button < 0 || !drawn_.areas[static_cast<std::size_t>(button)].isEnabled) return std::nullopt;
   const Effect effect = effects_[static_cast<std::size_t>(button)];
-  if (effect.action) return effect.action;
-  if (effect.tab) {
-    tab_ = *effect.tab;
-    page_ = 0;
+  switch (effect.kind) {
+    case Effect::Kind::kAction: {
+      PanelAction action{.kind = effect.action};
+      if (action.kind == PanelActionKind::kQuality) action.quality = effect.value;
+      if (action.kind == PanelActionKind::kJoinScene) action.scene = facts_.scenes[effect.value].name.view();
+      return action;
+    }
+    case Effect::Kind::kTab:
+      tab_ = static_cast<PanelTab>(effect.value);
+      page_ = 0;
+      break;
+    case Effect::Kind::kPage:
+      page_ = effect.value;
+      break;
   }
-  if (effect.page) page_ = *effect.page;
   layOut();
   return std::nullopt;
 }

@@ -7,11 +7,14 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/xr/panel/panel_drawing.h"
 #include "clients/xr/stage/stage.h"
+#include "clients/xr/text/fixed_text.h"
 #include "clients/xr/text/painter.h"
 
 namespace clothstream::xr {
@@ -19,19 +22,19 @@ namespace clothstream::xr {
 // The panel shows these facts. The program fills them in (panel_facts.h does so from a cs_client).
 struct PanelFacts {
   struct Scene {
-    std::string name;
+    FixedText name;
     std::uint32_t participants = 0;
     bool operator==(const Scene&) const = default;
   };
   struct Person {
-    std::string name;
-    std::string detail;  // role, or "away"
+    FixedText name;
+    FixedText detail;  // role, or "away"
     bool isSelf = false;
     bool operator==(const Person&) const = default;
   };
   // A figure of the stream, such as {"round trip", "12.1 ms"}.
   struct Figure {
-    std::string name, value;
+    FixedText name, value;
     bool operator==(const Figure&) const = default;
   };
 
@@ -75,7 +78,8 @@ class Panel {
   // `painter` measures texts, and must outlive the panel.
   explicit Panel(TextPainter& painter);
 
-  // Shows the facts. Lays out and draws only if they have changed.
+  // Shows the facts. Lays out and draws only if they have changed. Allocates nothing after the first calls,
+  // unless there are more scenes, people or characters of other scripts than before.
   void show(const PanelFacts& facts);
   // The quad for a stage, with the middle of its upper edge at the pose. Its picture is the newest that is
   // drawn, and valid until the next call.
@@ -109,12 +113,13 @@ class Panel {
  private:
   // A press of a button does this.
   struct Effect {
-    std::optional<PanelAction> action{};
-    std::optional<PanelTab> tab{};
-    std::optional<std::uint32_t> page{};
+    enum class Kind { kAction, kTab, kPage };
+    Kind kind = Kind::kAction;
+    PanelActionKind action = PanelActionKind::kReset;
+    std::uint32_t value = 0;  // tab, page, quality, or index of the scene
   };
   struct Item {
-    std::string text, detail{};
+    FixedText text, detail{};
     bool isChosen = false, isEnabled = true;
     Effect effect{};
   };
@@ -122,10 +127,12 @@ class Panel {
   void layOut();
   void layOutTrouble(float& top);
   void layOutTab(float& top);
+  void layOutScenes(float& top);
   void addText(float& top, const std::string& text, std::size_t most, bool isStrong);
-  void addButtons(float& top, const std::vector<Item>& items, float left = kPanelMargin);
+  void addButtons(float& top, std::span<const Item> items, float left = kPanelMargin);
+  void addButton(float& top, const Item& item) { addButtons(top, {&item, 1}); }
   // Buttons or lines of a list, and buttons for its other pages if it has more than `most` rows.
-  void addList(float& top, std::size_t most, const std::vector<Item>& items, bool areButtons);
+  void addList(float& top, std::size_t most, std::span<const Item> items, bool areButtons);
   int buttonAt(const Eigen::Vector2f& place) const;
   std::optional<PanelAction> press(int button);
 
@@ -137,6 +144,10 @@ class Panel {
   std::uint32_t page_ = 0;
   PanelDrawing drawn_;
   std::vector<Effect> effects_;  // of each button
+  // Memory of layOut().
+  std::vector<PanelArea> areasBefore_;
+  std::vector<Item> items_;
+  std::vector<std::string_view> wrapped_;
   std::array<bool, kPointers> wasPressed_{};
   std::array<std::optional<int>, kPointers> presses_{};  // button on which a press began, or -1
   std::array<std::optional<bool>, kPointers> tipWasInFront_{};

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "clients/xr/panel/panel_facts.h"
 
-#include <fmt/format.h>
-
 namespace clothstream::xr {
 namespace {
 
@@ -38,9 +36,10 @@ void readPeople(const cs_client* client, PanelFacts& facts) {
     cs_participant person;
     if (cs_get_participant(client, i, &person) == 0) continue;
     const bool hasName = *person.name != '\0';
-    facts.people.push_back({.name = hasName ? person.name : fmt::format("participant {}", person.id),
-                            .detail = person.away != 0 ? "away" : nameOf(person.role),
-                            .isSelf = person.id == self});
+    facts.people.push_back(
+        {.name = hasName ? FixedText(person.name) : FixedText::format("participant {}", person.id),
+         .detail = person.away != 0 ? "away" : nameOf(person.role),
+         .isSelf = person.id == self});
   }
 }
 
@@ -58,18 +57,19 @@ void readPanelFacts(cs_client* client, std::uint64_t nowUs, PanelFacts& facts) {
     return;
   const double up = statistics.round_trip_ms / 2;
   facts.figures = {
-      {"stream", fmt::format("{:.0f} frames/s", statistics.frames_per_second)},
-      {"vertices", fmt::format("{}", cs_vertex_count(client))},
-      {"network", fmt::format("{:.0f} kbit/s", statistics.kbit_per_second)},
-      {"precision", fmt::format("{:.1f} bits/vertex", statistics.bits_per_vertex)},
-      {"round trip", fmt::format("{:.1f} ms", statistics.round_trip_ms)},
-      {"pose to picture", fmt::format("{:.0f} ms", up + stages.delay_ms)},
-      {"play-out", fmt::format("{:.0f} ms", stages.delay_ms)},
-      {"decode", fmt::format("{:.2f} ms", statistics.decode_ms)},
-      {"dropped", fmt::format("{}", statistics.dropped)},
+      {"stream", FixedText::format("{:.0f} frames/s", statistics.frames_per_second)},
+      {"vertices", FixedText::format("{}", cs_vertex_count(client))},
+      {"network", FixedText::format("{:.0f} kbit/s", statistics.kbit_per_second)},
+      {"precision", FixedText::format("{:.1f} bits/vertex", statistics.bits_per_vertex)},
+      {"round trip", FixedText::format("{:.1f} ms", statistics.round_trip_ms)},
+      {"pose to picture", FixedText::format("{:.0f} ms", up + stages.delay_ms)},
+      {"play-out", FixedText::format("{:.0f} ms", stages.delay_ms)},
+      {"decode", FixedText::format("{:.2f} ms", statistics.decode_ms)},
+      {"dropped", FixedText::format("{}", statistics.dropped)},
   };
-  facts.status = isLive ? fmt::format("{:.0f} frames/s, round trip {:.0f} ms", statistics.frames_per_second,
-                                      statistics.round_trip_ms)
+  facts.status = isLive ? FixedText::format("{:.0f} frames/s, round trip {:.0f} ms",
+                                            statistics.frames_per_second, statistics.round_trip_ms)
+                              .view()
                         : "The connection is lost";
 }
 

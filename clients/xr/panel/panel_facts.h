@@ -10,7 +10,7 @@
 
 namespace clothstream::xr {
 
-// Reads scenes, people and figures of an acquired client. Call it a few times a second: it allocates. Members
+// Reads scenes, people and figures of an acquired client. Call it a few times a second. Members
 // that the client does not know (trouble, advice, canRetry, canRecenter, quality) stay; `status` is replaced
 // by figures in short.
 void readPanelFacts(cs_client* client, std::uint64_t nowUs, PanelFacts& facts);

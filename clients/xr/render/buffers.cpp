@@ -19,17 +19,34 @@ void check(VkResult result, const char* call) {
   throw std::runtime_error(fmt::format("{} failed with {}{}", call, static_cast<int>(result), meaning));
 }
 
-std::uint32_t memoryType(const GraphicsDevice& device, std::uint32_t allowed, VkMemoryPropertyFlags needed,
-                         VkMemoryPropertyFlags preferred) {
-  VkPhysicalDeviceMemoryProperties memory{};
-  vkGetPhysicalDeviceMemoryProperties(device.physical, &memory);
-  for (const VkMemoryPropertyFlags wanted : {needed | preferred, needed})
-    for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i)
-      if ((allowed & (1U << i)) != 0 && (memory.memoryTypes[i].propertyFlags & wanted) == wanted) return i;
-  throw std::runtime_error("the graphics device has no memory of the kind that the renderer needs");
+Owned<VkDeviceMemory> allocateMemory(const GraphicsDevice& device, const VkMemoryRequirements& needs,
+                                     std::initializer_list<VkMemoryPropertyFlags> wanted) {
+  VkPhysicalDeviceMemoryProperties properties{};
+  vkGetPhysicalDeviceMemoryProperties(device.physical, &properties);
+  // Memory of the device that the program can write is often scarce.
+  VkResult result = VK_ERROR_FEATURE_NOT_PRESENT;
+  for (const VkMemoryPropertyFlags flags : wanted)
+    for (std::uint32_t i = 0; i < properties.memoryTypeCount; ++i) {
+      if ((needs.memoryTypeBits & (1U << i)) == 0 ||
+          (properties.memoryTypes[i].propertyFlags & flags) != flags)
+        continue;
+      VkMemoryAllocateInfo allocation{};
+      allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+      allocation.allocationSize = needs.size;
+      allocation.memoryTypeIndex = i;
+      VkDeviceMemory memory = VK_NULL_HANDLE;
+      result = vkAllocateMemory(device.device, &allocation, nullptr, &memory);
+      if (result == VK_SUCCESS) return {device.device, memory, vkFreeMemory};
+      if (result != VK_ERROR_OUT_OF_DEVICE_MEMORY) check(result, "vkAllocateMemory");
+    }
+  if (result == VK_ERROR_FEATURE_NOT_PRESENT)
+    throw std::runtime_error("the graphics device has no memory of the kind that the renderer needs");
+  throw std::runtime_error(
+      fmt::format("the graphics device has no {} bytes of memory left for the scene", needs.size));
 }
 
-Buffer::Buffer(const GraphicsDevice& device, VkDeviceSize bytes, VkBufferUsageFlags usage, bool mapped)
+Buffer::Buffer(const GraphicsDevice& device, VkDeviceSize bytes, VkBufferUsageFlags usage,
+               BufferAccess access)
     : bytes_(bytes) {
   VkBufferCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
@@ -42,16 +59,21 @@ Buffer::Buffer(const GraphicsDevice& device, VkDeviceSize bytes, VkBufferUsageFl
   vkGetBufferMemoryRequirements(device.device, buffer, &needs);
   constexpr VkMemoryPropertyFlags kMapped =
       VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-  VkMemoryAllocateInfo allocation{};
-  allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
-  allocation.allocationSize = needs.size;
-  allocation.memoryTypeIndex =
-      memoryType(device, needs.memoryTypeBits, mapped ? kMapped : 0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
-  VkDeviceMemory memory = VK_NULL_HANDLE;
-  check(vkAllocateMemory(device.device, &allocation, nullptr, &memory), "vkAllocateMemory");
-  memory_ = {device.device, memory, vkFreeMemory};
-  check(vkBindBufferMemory(device.device, buffer, memory, 0), "vkBindBufferMemory");
-  if (mapped) check(vkMapMemory(device.device, memory, 0, VK_WHOLE_SIZE, 0, &data_), "vkMapMemory");
+  constexpr VkMemoryPropertyFlags kOfDevice = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
+  switch (access) {
+    case BufferAccess::kNone:
+      memory_ = allocateMemory(device, needs, {kOfDevice, 0});
+      break;
+    case BufferAccess::kWritten:
+      memory_ = allocateMemory(device, needs, {kMapped | kOfDevice, kMapped});
+      break;
+    case BufferAccess::kRead:  // reads of memory without a cache are many times slower
+      memory_ = allocateMemory(device, needs, {kMapped | VK_MEMORY_PROPERTY_HOST_CACHED_BIT, kMapped});
+      break;
+  }
+  check(vkBindBufferMemory(device.device, buffer, memory_.get(), 0), "vkBindBufferMemory");
+  if (access != BufferAccess::kNone)
+    check(vkMapMemory(device.device, memory_.get(), 0, VK_WHOLE_SIZE, 0, &data_), "vkMapMemory");
 }
 
 void runNow(const GraphicsDevice& device, const std::function<void(VkCommandBuffer)>& record) {
@@ -83,9 +105,10 @@ void runNow(const GraphicsDevice& device, const std::function<void(VkCommandBuff
 
 Buffer deviceBuffer(const GraphicsDevice& device, const void* data, VkDeviceSize bytes,
                     VkBufferUsageFlags usage) {
-  Buffer buffer(device, std::max<VkDeviceSize>(bytes, 16), usage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false);
+  Buffer buffer(device, std::max<VkDeviceSize>(bytes, 16), usage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                BufferAccess::kNone);
   if (bytes == 0) return buffer;
-  const Buffer staging(device, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true);
+  const Buffer staging(device, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, BufferAccess::kWritten);
   std::memcpy(staging.data(), data, bytes);
   runNow(device, [&](VkCommandBuffer commands) {
     const VkBufferCopy copy{0, 0, bytes};

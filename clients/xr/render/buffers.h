@@ -4,27 +4,31 @@
 
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 
 #include "clients/xr/render/handle.h"
 
 namespace clothstream::xr {
 
-// Index of a type of memory with these properties among the allowed types; `preferred` ones are added where
-// there are such. Throws std::runtime_error if there is none.
-std::uint32_t memoryType(const GraphicsDevice& device, std::uint32_t allowed, VkMemoryPropertyFlags needed,
-                         VkMemoryPropertyFlags preferred);
+// Allocates memory of a type with the first of these sets of properties that there is and that has space.
+// Throws std::runtime_error if there is no such memory.
+Owned<VkDeviceMemory> allocateMemory(const GraphicsDevice& device, const VkMemoryRequirements& needs,
+                                     std::initializer_list<VkMemoryPropertyFlags> wanted);
+
+// How the program uses the memory of a buffer: not at all; it writes it; or it reads it. The latter two are
+// mapped as long as the buffer exists, and need no flushes.
+enum class BufferAccess { kNone, kWritten, kRead };
 
 // A buffer with its own memory.
 class Buffer {
  public:
   Buffer() = default;
-  // `mapped`: the memory is visible to the program as long as the buffer exists, without flushes; else it is
-  // that of the device alone. `bytes` is at least 1.
-  Buffer(const GraphicsDevice& device, VkDeviceSize bytes, VkBufferUsageFlags usage, bool mapped);
+  // `bytes` is at least 1.
+  Buffer(const GraphicsDevice& device, VkDeviceSize bytes, VkBufferUsageFlags usage, BufferAccess access);
 
   VkBuffer get() const { return buffer_.get(); }
   VkDeviceSize bytes() const { return bytes_; }
-  // Null unless mapped.
+  // Null with BufferAccess::kNone.
   void* data() const { return data_; }
 
  private:

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "clients/xr/render/device.h"
 
+#include <algorithm>
 #include <stdexcept>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -46,6 +48,24 @@ std::string unsuitableBecause(VkPhysicalDevice physical) {
     return fmt::format("{} cannot resolve depth.", name);
   if (!graphicsQueueFamily(physical)) return fmt::format("{} has no queue for graphics and compute.", name);
   return "";
+}
+
+bool hasDensityMaps(VkPhysicalDevice physical) {
+  std::uint32_t count = 0;
+  vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, nullptr);
+  std::vector<VkExtensionProperties> extensions(count);
+  vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, extensions.data());
+  const auto isWanted = [](const VkExtensionProperties& each) {
+    return std::string_view(each.extensionName) == VK_EXT_FRAGMENT_DENSITY_MAP_EXTENSION_NAME;
+  };
+  if (std::ranges::none_of(extensions, isWanted)) return false;
+  VkPhysicalDeviceFragmentDensityMapFeaturesEXT density{};
+  density.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FRAGMENT_DENSITY_MAP_FEATURES_EXT;
+  VkPhysicalDeviceFeatures2 features{};
+  features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+  features.pNext = &density;
+  vkGetPhysicalDeviceFeatures2(physical, &features);
+  return density.fragmentDensityMap == VK_TRUE && density.fragmentDensityMapNonSubsampledImages == VK_TRUE;
 }
 
 std::optional<std::uint32_t> graphicsQueueFamily(VkPhysicalDevice physical) {

@@ -36,6 +36,10 @@ std::vector<const char*> requiredDeviceExtensions();
 // Reason why the renderer cannot use a device, as a sentence; "" if it can.
 std::string unsuitableBecause(VkPhysicalDevice physical);
 
+// Whether the device has VK_EXT_fragment_density_map, also for images that are not subsampled, such as those
+// of swapchains.
+bool hasDensityMaps(VkPhysicalDevice physical);
+
 // First queue family with graphics and compute; none if there is none.
 std::optional<std::uint32_t> graphicsQueueFamily(VkPhysicalDevice physical);
 
@@ -74,11 +78,12 @@ class LoadedInstance {
 };
 
 // Parameters of vkCreateDevice, or of xrCreateVulkanDeviceKHR: one queue of the family, and the features that
-// the renderer needs. `extensions` are added to the required ones and must outlive the request.
+// the renderer needs. `extensions` are added to the required ones and must outlive the request. With
+// `wantsDensity`, also what hasDensityMaps() has found.
 class DeviceRequest {
  public:
-  DeviceRequest(VkPhysicalDevice physical, std::uint32_t queueFamily,
-                std::span<const char* const> extensions);
+  DeviceRequest(VkPhysicalDevice physical, std::uint32_t queueFamily, std::span<const char* const> extensions,
+                bool wantsDensity = false);
   DeviceRequest(const DeviceRequest&) = delete;
   DeviceRequest& operator=(const DeviceRequest&) = delete;
 
@@ -89,6 +94,7 @@ class DeviceRequest {
   std::vector<const char*> extensions_;
   float priority_ = 1;
   VkDeviceQueueCreateInfo queue_{};
+  VkPhysicalDeviceFragmentDensityMapFeaturesEXT density_{};
   VkPhysicalDeviceVulkan11Features multiview_{};
   VkPhysicalDeviceFeatures2 features_{};
   VkDeviceCreateInfo info_{};

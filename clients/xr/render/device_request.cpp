@@ -105,9 +105,10 @@ LoadedInstance::~LoadedInstance() {
 }
 
 DeviceRequest::DeviceRequest(VkPhysicalDevice physical, std::uint32_t queueFamily,
-                             std::span<const char* const> extensions)
+                             std::span<const char* const> extensions, bool wantsDensity)
     : extensions_(requiredDeviceExtensions()) {
   extensions_.insert(extensions_.end(), extensions.begin(), extensions.end());
+  if (wantsDensity) extensions_.push_back(VK_EXT_FRAGMENT_DENSITY_MAP_EXTENSION_NAME);
   queue_ = {.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
             .pNext = nullptr,
             .flags = 0,
@@ -118,6 +119,9 @@ DeviceRequest::DeviceRequest(VkPhysicalDevice physical, std::uint32_t queueFamil
   vkGetPhysicalDeviceFeatures(physical, &available);
   multiview_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES;
   multiview_.multiview = VK_TRUE;
+  if (wantsDensity) multiview_.pNext = &density_;
+  density_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FRAGMENT_DENSITY_MAP_FEATURES_EXT;
+  density_.fragmentDensityMap = density_.fragmentDensityMapNonSubsampledImages = VK_TRUE;
   features_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
   features_.pNext = &multiview_;
   features_.features.samplerAnisotropy = available.samplerAnisotropy;

@@ -3,32 +3,34 @@
 
 #include <cstdint>
 
-#include "clients/xr/render/handle.h"
-
 namespace clothstream::xr {
 
 FrameCommands::FrameCommands(const GraphicsDevice& device) : device_(device) {
-  VkCommandPoolCreateInfo pool{};
-  pool.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
-  pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-  pool.queueFamilyIndex = device.queueFamily;
-  check(vkCreateCommandPool(device.device, &pool, nullptr, &pool_), "vkCreateCommandPool");
+  VkCommandPoolCreateInfo poolInfo{};
+  poolInfo.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+  poolInfo.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+  poolInfo.queueFamilyIndex = device.queueFamily;
+  VkCommandPool pool = VK_NULL_HANDLE;
+  check(vkCreateCommandPool(device.device, &poolInfo, nullptr, &pool), "vkCreateCommandPool");
+  pool_ = {device.device, pool, vkDestroyCommandPool};
   VkCommandBufferAllocateInfo buffers{};
   buffers.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
-  buffers.commandPool = pool_;
+  buffers.commandPool = pool;
   buffers.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
   buffers.commandBufferCount = kFramesInFlight;
   check(vkAllocateCommandBuffers(device.device, &buffers, buffers_.data()), "vkAllocateCommandBuffers");
-  VkFenceCreateInfo fence{};
-  fence.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
-  fence.flags = VK_FENCE_CREATE_SIGNALED_BIT;
-  for (VkFence& each : fences_) check(vkCreateFence(device.device, &fence, nullptr, &each), "vkCreateFence");
+  VkFenceCreateInfo fenceInfo{};
+  fenceInfo.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
+  fenceInfo.flags = VK_FENCE_CREATE_SIGNALED_BIT;
+  for (Owned<VkFence>& each : fences_) {
+    VkFence fence = VK_NULL_HANDLE;
+    check(vkCreateFence(device.device, &fenceInfo, nullptr, &fence), "vkCreateFence");
+    each = {device.device, fence, vkDestroyFence};
+  }
 }
 
 FrameCommands::~FrameCommands() {
   vkDeviceWaitIdle(device_.device);
-  for (const VkFence fence : fences_) vkDestroyFence(device_.device, fence, nullptr);
-  vkDestroyCommandPool(device_.device, pool_, nullptr);
 }
 
 VkCommandBuffer FrameCommands::begin() {
@@ -43,7 +45,8 @@ VkCommandBuffer FrameCommands::begin() {
 
 void FrameCommands::submit(VkSemaphore available, VkSemaphore drawn) {
   check(vkEndCommandBuffer(buffers_[current_]), "vkEndCommandBuffer");
-  check(vkResetFences(device_.device, 1, &fences_[current_]), "vkResetFences");
+  const VkFence fence = fences_[current_].get();
+  check(vkResetFences(device_.device, 1, &fence), "vkResetFences");
   VkSubmitInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
   info.commandBufferCount = 1;
@@ -54,11 +57,12 @@ void FrameCommands::submit(VkSemaphore available, VkSemaphore drawn) {
   info.pWaitSemaphores = &available;
   info.signalSemaphoreCount = drawn == VK_NULL_HANDLE ? 0 : 1;
   info.pSignalSemaphores = &drawn;
-  check(vkQueueSubmit(device_.queue, 1, &info, fences_[current_]), "vkQueueSubmit");
+  check(vkQueueSubmit(device_.queue, 1, &info, fence), "vkQueueSubmit");
 }
 
 void FrameCommands::finish() {
-  check(vkWaitForFences(device_.device, 1, &fences_[current_], VK_TRUE, UINT64_MAX), "vkWaitForFences");
+  const VkFence fence = fences_[current_].get();
+  check(vkWaitForFences(device_.device, 1, &fence, VK_TRUE, UINT64_MAX), "vkWaitForFences");
 }
 
 }  // namespace clothstream::xr

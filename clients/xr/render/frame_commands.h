@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "clients/xr/render/handle.h"
 #include "clients/xr/render/renderer.h"
 
 namespace clothstream::xr {
@@ -27,9 +28,9 @@ class FrameCommands {
 
  private:
   GraphicsDevice device_;
-  VkCommandPool pool_ = VK_NULL_HANDLE;
+  Owned<VkCommandPool> pool_;
   std::array<VkCommandBuffer, kFramesInFlight> buffers_{};
-  std::array<VkFence, kFramesInFlight> fences_{};
+  std::array<Owned<VkFence>, kFramesInFlight> fences_;
   std::size_t current_ = 0;
 };
 

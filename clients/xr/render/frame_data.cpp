@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <stdexcept>
+
+#include <fmt/format.h>
 
 #include "clients/xr/render/weave.h"
 
@@ -87,6 +90,9 @@ Eigen::Vector3f eyeOf(const View& view) {
 FrameData::FrameData(const GraphicsDevice& device, const Pipelines& pipelines, const Passes& passes,
                      const Textures& textures)
     : device_(device) {
+  VkPhysicalDeviceProperties properties{};
+  vkGetPhysicalDeviceProperties(device.physical, &properties);
+  mostBytes_ = properties.limits.maxStorageBufferRange;
   const std::array<VkDescriptorPoolSize, 3> sizes{{
       {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kFramesInFlight},
       {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, kFramesInFlight * 8},
@@ -110,8 +116,10 @@ FrameData::FrameData(const GraphicsDevice& device, const Pipelines& pipelines, c
     info.descriptorSetCount = 1;
     info.pSetLayouts = &layout;
     check(vkAllocateDescriptorSets(device.device, &info, &slot.set), "vkAllocateDescriptorSets");
-    slot.frame = Buffer(device, sizeof(shaders::Frame), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, true);
-    slot.staging = Buffer(device, Textures::stagingBytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true);
+    slot.frame =
+        Buffer(device, sizeof(shaders::Frame), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, BufferAccess::kWritten);
+    slot.staging =
+        Buffer(device, Textures::stagingBytes(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, BufferAccess::kWritten);
     bindBuffer(slot, shaders::kFrameBinding, slot.frame.get());
     grow(slot, slot.parts, shaders::kPartsBinding, kFirstParts * sizeof(shaders::PartRecord));
     grow(slot, slot.solids, shaders::kSolidsBinding, kFirstSolids * sizeof(shaders::SolidRecord));
@@ -173,11 +181,25 @@ void FrameData::bindImage(Slot& slot, std::uint32_t binding, VkImageView view, V
 
 void FrameData::grow(Slot& slot, Buffer& buffer, std::uint32_t binding, VkDeviceSize bytes) const {
   if (buffer.bytes() >= bytes) return;
-  buffer = Buffer(device_, std::max(bytes, 2 * buffer.bytes()), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, true);
+  buffer = Buffer(device_, std::max(bytes, 2 * buffer.bytes()), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                  BufferAccess::kWritten);
   bindBuffer(slot, binding, buffer.get());
 }
 
 void FrameData::upload(const Stage& stage) {
+  const VkDeviceSize nodeBytes = std::max<VkDeviceSize>(16, VkDeviceSize{12} * stage.nodeCount);
+  VkDeviceSize largest = nodeBytes;
+  const auto measure = [&](const auto& list) {
+    largest = std::max<VkDeviceSize>(largest, list.size() * sizeof(list[0]));
+  };
+  measure(stage.vertices);
+  measure(stage.fanStarts);
+  measure(stage.fans);
+  if (largest > mostBytes_)
+    throw std::runtime_error(fmt::format(
+        "the scene is too large for the graphics device: a list of its {} vertices has {} bytes; a "
+        "storage buffer has at most {}",
+        stage.clothNodeCount, largest, mostBytes_));
   const auto copy = [&](const auto& list, VkBufferUsageFlags usage) {
     return deviceBuffer(device_, list.data(), list.size() * sizeof(list[0]), usage);
   };
@@ -186,7 +208,6 @@ void FrameData::upload(const Stage& stage) {
   indices_ = copy(stage.indices, VK_BUFFER_USAGE_INDEX_BUFFER_BIT);
   fanStarts_ = copy(stage.fanStarts, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
   fans_ = copy(stage.fans, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
-  const VkDeviceSize nodeBytes = std::max<VkDeviceSize>(16, VkDeviceSize{12} * stage.nodeCount);
   for (Slot& slot : slots_) {
     grow(slot, slot.positions, shaders::kPositionsBinding, nodeBytes);
     grow(slot, slot.normals, shaders::kNormalsBinding, nodeBytes);

@@ -34,7 +34,8 @@ class FrameData {
   FrameData(const GraphicsDevice& device, const Pipelines& pipelines, const Passes& passes,
             const Textures& textures);
 
-  // Copies the lists of the topology. The device must be idle.
+  // Copies the lists of the topology. The device must be idle. Throws std::runtime_error if they are larger
+  // than the device allows, or without memory.
   void upload(const Stage& stage);
 
   // Starts the next frame: writes everything of the stage into the memory of its slot. Returns the set with
@@ -72,6 +73,7 @@ class FrameData {
   void writeSolids(const Stage& stage, Slot& slot);
 
   GraphicsDevice device_;
+  VkDeviceSize mostBytes_ = 0;  // of a storage buffer
   Owned<VkDescriptorPool> pool_;
   Buffer vertices_, indices_, fanStarts_, fans_;
   Buffer solidIndices_;

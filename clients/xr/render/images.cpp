@@ -48,18 +48,12 @@ Image::Image(const GraphicsDevice& device, const ImageOptions& options) : option
   VkMemoryRequirements needs{};
   vkGetImageMemoryRequirements(device.device, image, &needs);
   const bool isTransient = (options.usage & VK_IMAGE_USAGE_TRANSIENT_ATTACHMENT_BIT) != 0;
-  VkMemoryAllocateInfo allocation{};
-  allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
-  allocation.allocationSize = needs.size;
-  allocation.memoryTypeIndex =
-      memoryType(device, needs.memoryTypeBits, 0,
-                 VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT |
-                     (isTransient ? VkMemoryPropertyFlags{VK_MEMORY_PROPERTY_LAZILY_ALLOCATED_BIT}
-                                  : VkMemoryPropertyFlags{0}));
-  VkDeviceMemory memory = VK_NULL_HANDLE;
-  check(vkAllocateMemory(device.device, &allocation, nullptr, &memory), "vkAllocateMemory");
-  memory_ = {device.device, memory, vkFreeMemory};
-  check(vkBindImageMemory(device.device, image, memory, 0), "vkBindImageMemory");
+  constexpr VkMemoryPropertyFlags kOfDevice = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
+  // Tiled devices keep transient attachments out of memory.
+  const VkMemoryPropertyFlags best =
+      isTransient ? kOfDevice | VK_MEMORY_PROPERTY_LAZILY_ALLOCATED_BIT : kOfDevice;
+  memory_ = allocateMemory(device, needs, {best, kOfDevice, 0});
+  check(vkBindImageMemory(device.device, image, memory_.get(), 0), "vkBindImageMemory");
   VkImageViewCreateInfo viewInfo{};
   viewInfo.sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO;
   viewInfo.image = image;
@@ -81,17 +75,30 @@ void changeLayout(VkCommandBuffer commands, const Image& image, std::uint32_t fi
   barrier(commands, image, {options.aspect, 0, options.levels, firstLayer, layers}, from, to);
 }
 
+VkBufferImageCopy copyInto(const Image& image, std::uint32_t layer, VkOffset2D at, VkExtent2D size,
+                           VkDeviceSize offset) {
+  VkBufferImageCopy copy{};
+  copy.bufferOffset = offset;
+  copy.imageSubresource = {image.options().aspect, 0, layer, 1};
+  copy.imageOffset = {at.x, at.y, 0};
+  copy.imageExtent = {size.width, size.height, 1};
+  return copy;
+}
+
 void recordTexels(VkCommandBuffer commands, const Image& image, std::uint32_t layer, VkExtent2D size,
                   VkBuffer from, VkDeviceSize offset, bool wasUndefined) {
+  const VkBufferImageCopy copy = copyInto(image, layer, {0, 0}, size, offset);
+  recordTexels(commands, image, layer, {&copy, 1}, from, wasUndefined);
+}
+
+void recordTexels(VkCommandBuffer commands, const Image& image, std::uint32_t layer,
+                  std::span<const VkBufferImageCopy> copies, VkBuffer from, bool wasUndefined) {
   const ImageOptions& options = image.options();
   const Access before = wasUndefined ? Access{VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, 0, VK_IMAGE_LAYOUT_UNDEFINED}
                                      : Access{VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, 0, kSampled.layout};
   changeLayout(commands, image, layer, 1, before, kCopiedTo);
-  VkBufferImageCopy copy{};
-  copy.bufferOffset = offset;
-  copy.imageSubresource = {options.aspect, 0, layer, 1};
-  copy.imageExtent = {size.width, size.height, 1};
-  vkCmdCopyBufferToImage(commands, from, image.get(), kCopiedTo.layout, 1, &copy);
+  vkCmdCopyBufferToImage(commands, from, image.get(), kCopiedTo.layout,
+                         static_cast<std::uint32_t>(copies.size()), copies.data());
   for (std::uint32_t level = 1; level < options.levels; ++level) {
     const VkImageSubresourceRange larger{options.aspect, level - 1, 1, layer, 1};
     barrier(commands, image, larger, kCopiedTo, kCopiedFrom);

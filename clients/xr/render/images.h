@@ -52,8 +52,15 @@ void changeLayout(VkCommandBuffer commands, const Image& image, std::uint32_t fi
 inline constexpr Access kSampled{VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT,
                                  VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL};
 
-// Records a copy of texels from a buffer into the upper left part of a layer, and makes its smaller levels.
-// The layer was sampled or undefined before, and is sampled afterwards.
+// Copy of texels, whose rows follow each other in a buffer, into a rectangle of a layer.
+VkBufferImageCopy copyInto(const Image& image, std::uint32_t layer, VkOffset2D at, VkExtent2D size,
+                           VkDeviceSize offset);
+
+// Records copies into a layer, and makes its smaller levels. The layer was sampled or undefined before, and
+// is sampled afterwards.
+void recordTexels(VkCommandBuffer commands, const Image& image, std::uint32_t layer,
+                  std::span<const VkBufferImageCopy> copies, VkBuffer from, bool wasUndefined);
+// Likewise for one copy into the upper left part.
 void recordTexels(VkCommandBuffer commands, const Image& image, std::uint32_t layer, VkExtent2D size,
                   VkBuffer from, VkDeviceSize offset, bool wasUndefined);
 

@@ -40,7 +40,7 @@ Offscreen::Offscreen(const GraphicsDevice& device, VkExtent2D size, std::uint32_
                        .layers = views,
                        .usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT}),
       pixels_(device, VkDeviceSize{4} * size.width * size.height * views, VK_BUFFER_USAGE_TRANSFER_DST_BIT,
-              true) {
+              BufferAccess::kRead) {
   if (!hasDepth) return;
   depth_.emplace(device, ImageOptions{.format = VK_FORMAT_D32_SFLOAT,
                                       .size = size,
@@ -49,7 +49,7 @@ Offscreen::Offscreen(const GraphicsDevice& device, VkExtent2D size, std::uint32_
                                                VK_IMAGE_USAGE_TRANSFER_SRC_BIT,
                                       .aspect = VK_IMAGE_ASPECT_DEPTH_BIT});
   depths_ = Buffer(device, VkDeviceSize{4} * size.width * size.height * views,
-                   VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
+                   VK_BUFFER_USAGE_TRANSFER_DST_BIT, BufferAccess::kRead);
 }
 
 void Offscreen::recordRead(VkCommandBuffer commands) const {

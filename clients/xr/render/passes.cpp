@@ -53,9 +53,11 @@ VkSubpassDependency2 dependency(std::uint32_t from, std::uint32_t to, VkPipeline
 
 Owned<VkRenderPass> renderPass(VkDevice device, const std::vector<VkAttachmentDescription2>& attachments,
                                const VkSubpassDescription2& subpass,
-                               const std::vector<VkSubpassDependency2>& dependencies) {
+                               const std::vector<VkSubpassDependency2>& dependencies,
+                               const VkRenderPassFragmentDensityMapCreateInfoEXT* density = nullptr) {
   VkRenderPassCreateInfo2 info{};
   info.sType = VK_STRUCTURE_TYPE_RENDER_PASS_CREATE_INFO_2;
+  info.pNext = density;
   info.attachmentCount = static_cast<std::uint32_t>(attachments.size());
   info.pAttachments = attachments.data();
   info.subpassCount = 1;
@@ -148,6 +150,7 @@ void Passes::makePicturePass(bool givesDepth) {
   const bool resolves = options_.samples != VK_SAMPLE_COUNT_1_BIT;
   constexpr VkImageLayout kColour = VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL;
   constexpr VkImageLayout kDepth = VK_IMAGE_LAYOUT_DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
+  constexpr VkImageLayout kDensity = VK_IMAGE_LAYOUT_FRAGMENT_DENSITY_MAP_OPTIMAL_EXT;
   constexpr auto kKeep = VK_ATTACHMENT_STORE_OP_STORE, kDrop = VK_ATTACHMENT_STORE_OP_DONT_CARE;
   const VkImageAspectFlags aspect = depthAspect(options_.depth);
   std::vector<VkAttachmentDescription2> attachments{
@@ -181,18 +184,28 @@ void Passes::makePicturePass(bool givesDepth) {
       subpass.pNext = &depthResolve;
     }
   }
+  VkRenderPassFragmentDensityMapCreateInfoEXT density{};
+  density.sType = VK_STRUCTURE_TYPE_RENDER_PASS_FRAGMENT_DENSITY_MAP_CREATE_INFO_EXT;
+  density.fragmentDensityMapAttachment = {static_cast<std::uint32_t>(attachments.size()), kDensity};
+  if (options_.hasDensity) {
+    VkAttachmentDescription2 map =
+        attachment(VK_FORMAT_R8G8_UNORM, VK_SAMPLE_COUNT_1_BIT, VK_ATTACHMENT_LOAD_OP_LOAD, kDrop, kDensity);
+    map.initialLayout = kDensity;
+    attachments.push_back(map);
+  }
   // Frames share the images with several samples, and use those of the target one after the other.
   constexpr VkPipelineStageFlags kStages = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT | kDepthStages;
   pictures_[givesDepth ? 1 : 0] = renderPass(
       device_.device, attachments, subpass,
       {dependency(VK_SUBPASS_EXTERNAL, 0, kStages,
                   VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT | VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT,
-                  kStages, kColourAccess | kDepthAccess)});
+                  kStages, kColourAccess | kDepthAccess)},
+      options_.hasDensity ? &density : nullptr);
 }
 
 VkFramebuffer Passes::framebuffer(const Target& target) {
   for (const Known& known : framebuffers_)
-    if (known.colour == target.colour && known.depth == target.depth &&
+    if (known.colour == target.colour && known.depth == target.depth && known.density == target.density &&
         known.size.width == target.size.width && known.size.height == target.size.height)
       return known.framebuffer.get();
   const bool resolves = options_.samples != VK_SAMPLE_COUNT_1_BIT;
@@ -204,7 +217,9 @@ VkFramebuffer Passes::framebuffer(const Target& target) {
   } else {
     views = {target.colour, givesDepth ? target.depth : depth_.view()};
   }
-  framebuffers_.push_back({target.colour, target.depth, target.size,
+  // The last attachment, as in the pass.
+  if (options_.hasDensity) views.push_back(target.density);
+  framebuffers_.push_back({target.colour, target.depth, target.density, target.size,
                            makeFramebuffer(device_.device, picture(givesDepth), views, target.size)});
   return framebuffers_.back().framebuffer.get();
 }

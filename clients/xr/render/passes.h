@@ -26,7 +26,7 @@ class Passes {
 
  private:
   struct Known {
-    VkImageView colour, depth;
+    VkImageView colour, depth, density;
     VkExtent2D size;
     Owned<VkFramebuffer> framebuffer;
   };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "clients/xr/render/renderer.h"
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 
@@ -9,6 +10,8 @@
 
 namespace clothstream::xr {
 namespace {
+
+constexpr std::uint32_t kMostGroups = 65'535;  // that every device can dispatch at once
 
 bool encodesByItself(VkFormat format) {
   switch (format) {
@@ -100,12 +103,15 @@ void Renderer::record(VkCommandBuffer commands, const Target& target, std::span<
 
 void Renderer::Parts::gatherNormals(VkCommandBuffer commands, const Stage& stage) const {
   // Normals of the stream are those of the cloths.
-  const NodeRange range{stage.normals.empty() ? 0 : stage.clothNodeCount, stage.nodeCount};
+  NodeRange range{stage.normals.empty() ? 0 : stage.clothNodeCount, stage.nodeCount};
   if (range.first >= range.end) return;
   vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines.gatherNormals());
-  vkCmdPushConstants(commands, pipelines.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(range), &range);
-  vkCmdDispatch(commands, (range.end - range.first + shaders::kNodesPerGroup - 1) / shaders::kNodesPerGroup,
-                1, 1);
+  for (; range.first < range.end; range.first += kMostGroups * shaders::kNodesPerGroup) {
+    const std::uint32_t groups =
+        (range.end - range.first + shaders::kNodesPerGroup - 1) / shaders::kNodesPerGroup;
+    vkCmdPushConstants(commands, pipelines.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(range), &range);
+    vkCmdDispatch(commands, std::min(groups, kMostGroups), 1, 1);
+  }
   VkMemoryBarrier barrier{};
   barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
   barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;

@@ -29,6 +29,8 @@ struct RendererOptions {
   std::uint32_t views = 1;                                // 1, or 2 for both eyes
   VkExtent2D largest{};                                   // largest Target::size
   ShadowDetail shadows = ShadowDetail::kFull;
+  // Whether each target has a density map. The device then has what hasDensityMaps() asks for.
+  bool hasDensity = false;
 };
 
 // Image to draw to. The image views have the type VK_IMAGE_VIEW_TYPE_2D_ARRAY, RendererOptions::views layers,
@@ -39,6 +41,10 @@ struct Target {
   // Gets the depth of the nearest sample: 0 at the near plane, 1 at the far plane. May be null.
   VkImageView depth = VK_NULL_HANDLE;
   VkExtent2D size{};  // drawn part, from the upper left corner
+  // Fragments per texel of the picture (VK_EXT_fragment_density_map), with RendererOptions::hasDensity; else
+  // null. The format is VK_FORMAT_R8G8_UNORM. The map is read in
+  // VK_IMAGE_LAYOUT_FRAGMENT_DENSITY_MAP_OPTIMAL_EXT, and keeps this layout.
+  VkImageView density = VK_NULL_HANDLE;
 };
 
 // One eye. Both matrices are OpenGL-like in their signs: the eye looks along -Z, with +Y up.

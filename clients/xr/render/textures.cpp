@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <future>
-#include <vector>
+#include <span>
 
 #include "clients/xr/render/weave.h"
 
@@ -35,12 +35,13 @@ bool filtersDepth(const GraphicsDevice& device) {
 }  // namespace
 
 Textures::Textures(const GraphicsDevice& device) {
+  panelCopies_.reserve(kPanelTexels[1] / kChangeRows);
   makeSamplers(device);
   constexpr VkExtent2D kPanelSize{kPanelTexels[0], kPanelTexels[1]};
   panel_ =
       Image(device, {.size = kPanelSize, .levels = levelsOf(kPanelSize), .usage = kUsage, .array = false});
   labels_ = Image(device, {.size = kLabelSize, .layers = kLabelLayers, .levels = 4, .usage = kUsage});
-  const Buffer nothing(device, kPanelBytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true);
+  const Buffer nothing(device, kPanelBytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, BufferAccess::kWritten);
   std::memset(nothing.data(), 0, kPanelBytes);
   runNow(device, [&](VkCommandBuffer commands) {
     recordTexels(commands, panel_, 0, kPanelSize, nothing.get(), 0, true);
@@ -91,7 +92,7 @@ void Textures::makeWeaves(const GraphicsDevice& device) {
   for (const Fabric& fabric : fabrics())
     weaves.push_back(std::async(std::launch::async, weave, std::cref(fabric), kWeaveTexels));
   constexpr VkDeviceSize kBytes = VkDeviceSize{4} * kWeaveTexels * kWeaveTexels;
-  const Buffer staging(device, 2 * kBytes * count, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true);
+  const Buffer staging(device, 2 * kBytes * count, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, BufferAccess::kWritten);
   auto* out = static_cast<std::uint8_t*>(staging.data());
   for (std::size_t i = 0; i < weaves.size(); ++i) {
     const WeaveTexels texels = weaves[i].get();
@@ -115,27 +116,45 @@ void Textures::record(VkCommandBuffer commands, const Stage& stage, const Buffer
   auto* bytes = static_cast<std::uint8_t*>(staging.data());
   const Picture* picture = stage.panel.visible ? stage.panel.picture : nullptr;
   if (picture != nullptr && picture->revision != panelRevision_ && picture->width <= kPanelTexels[0] &&
-      picture->height <= kPanelTexels[1]) {
-    panelRevision_ = picture->revision;
-    std::memcpy(bytes, picture->texels.data(), picture->texels.size());
-    recordTexels(commands, panel_, 0, {picture->width, picture->height}, staging.get(), 0, false);
-  }
+      picture->height <= kPanelTexels[1])
+    recordPanel(commands, *picture, staging);
   VkDeviceSize offset = kPanelBytes;
   std::uint32_t copied = 0;
   for (const Label& label : stage.labels) {
     const Picture& name = *label.picture;
-    Layer& layer = layerFor(label);
-    layer.usedIn = calls_;
-    if (layer.id == label.id && layer.revision == name.revision) continue;
-    if (copied == kLabelsPerFrame || name.width > kLabelSize.width || name.height > kLabelSize.height)
-      continue;
-    layer = {label.id, name.revision, calls_};
+    Layer* const layer = layerFor(label);
+    if (layer == nullptr || name.width > kLabelSize.width || name.height > kLabelSize.height) continue;
+    const bool isShown = layer->id == label.id && layer->revision == name.revision;
+    if (!isShown && copied == kLabelsPerFrame) continue;
+    layer->usedIn = calls_;
+    if (isShown) continue;
+    *layer = {label.id, name.revision, calls_};
     std::memcpy(bytes + offset, name.texels.data(), name.texels.size());
-    recordTexels(commands, labels_, static_cast<std::uint32_t>(&layer - layers_.data()),
+    recordTexels(commands, labels_, static_cast<std::uint32_t>(layer - layers_.data()),
                  {name.width, name.height}, staging.get(), offset, false);
     offset += kLabelBytes;
     ++copied;
   }
+}
+
+void Textures::recordPanel(VkCommandBuffer commands, const Picture& picture, const Buffer& staging) {
+  const TexelRect all{0, 0, picture.width, picture.height};
+  const bool isKnown = picture.since != 0 && picture.since == panelRevision_;
+  panelRevision_ = picture.revision;
+  panelCopies_.clear();
+  auto* out = static_cast<std::uint8_t*>(staging.data());
+  VkDeviceSize offset = 0;
+  for (const TexelRect& rect : isKnown ? std::span(picture.changes) : std::span(&all, 1)) {
+    const VkExtent2D size{rect.right - rect.left, rect.bottom - rect.top};
+    panelCopies_.push_back(
+        copyInto(panel_, 0, {static_cast<std::int32_t>(rect.left), static_cast<std::int32_t>(rect.top)}, size,
+                 offset));
+    const std::size_t rowBytes = std::size_t{4} * size.width;
+    for (std::uint32_t row = rect.top; row < rect.bottom; ++row, offset += rowBytes)
+      std::memcpy(out + offset, &picture.texels[4 * (std::size_t{row} * picture.width + rect.left)],
+                  rowBytes);
+  }
+  if (!panelCopies_.empty()) recordTexels(commands, panel_, 0, panelCopies_, staging.get(), false);
 }
 
 int Textures::layerOf(const Label& label) const {
@@ -146,11 +165,12 @@ int Textures::layerOf(const Label& label) const {
 }
 
 // The layer of the participant, or else the one whose last use is longest ago.
-Textures::Layer& Textures::layerFor(const Label& label) {
+Textures::Layer* Textures::layerFor(const Label& label) {
   for (Layer& layer : layers_)
-    if (layer.revision != 0 && layer.id == label.id) return layer;
-  return *std::min_element(layers_.begin(), layers_.end(),
-                           [](const Layer& a, const Layer& b) { return a.usedIn < b.usedIn; });
+    if (layer.revision != 0 && layer.id == label.id) return &layer;
+  Layer& oldest = *std::min_element(layers_.begin(), layers_.end(),
+                                    [](const Layer& a, const Layer& b) { return a.usedIn < b.usedIn; });
+  return oldest.usedIn == calls_ ? nullptr : &oldest;
 }
 
 }  // namespace clothstream::xr

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "clients/xr/render/images.h"
 #include "clients/xr/stage/stage.h"
@@ -26,8 +27,9 @@ class Textures {
 
   // Bytes of the staging buffer that record() needs.
   static VkDeviceSize stagingBytes();
-  // Records copies of pictures of the stage that have changed. `staging` is mapped, and not read by the
-  // device now. At most a few new labels are copied in one frame; the others follow in the next frames.
+  // Records copies of pictures of the stage that have changed; of the panel, only what has changed. `staging`
+  // is mapped, and not read by the device now. At most a few new labels are copied in one frame; the others
+  // follow in the next frames. If there are more labels than layers, the last ones are not drawn.
   void record(VkCommandBuffer commands, const Stage& stage, const Buffer& staging);
   // Layer of a label; -1 if its picture has not been copied.
   int layerOf(const Label& label) const;
@@ -39,7 +41,9 @@ class Textures {
   };
   static constexpr std::size_t kLabelLayers = 32;
 
-  Layer& layerFor(const Label& label);
+  // Null if all layers are used by other labels of this frame.
+  Layer* layerFor(const Label& label);
+  void recordPanel(VkCommandBuffer commands, const Picture& picture, const Buffer& staging);
   void makeSamplers(const GraphicsDevice& device);
   void makeWeaves(const GraphicsDevice& device);
 
@@ -48,6 +52,7 @@ class Textures {
   std::array<Layer, kLabelLayers> layers_{};
   std::uint64_t calls_ = 0;
   std::uint64_t panelRevision_ = 0;
+  std::vector<VkBufferImageCopy> panelCopies_;
 };
 
 }  // namespace clothstream::xr

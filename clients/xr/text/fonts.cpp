@@ -15,7 +15,8 @@ namespace clothstream::xr {
 namespace {
 
 constexpr char32_t kReplacement = 0xFFFD;
-constexpr std::size_t kMostFonts = 64;  // of the system's order of preference, per weight
+constexpr std::size_t kMostFonts = 64;     // of the system's order of preference, per weight
+constexpr std::size_t kMostGlyphs = 4096;  // names of other people can have any characters
 
 struct Source {
   std::string file;
@@ -106,6 +107,7 @@ Fonts::Fonts(const std::string& fontFile) : parts_(std::make_unique<Parts>()) {
 Fonts::~Fonts() = default;
 
 const Glyph& Fonts::glyph(char32_t character, std::uint32_t pixels, Weight weight) {
+  if (parts_->glyphs.size() >= kMostGlyphs) parts_->glyphs.clear();
   const auto [at, isNew] =
       parts_->glyphs.try_emplace({static_cast<std::uint32_t>(weight), pixels, character});
   Glyph& glyph = at->second;

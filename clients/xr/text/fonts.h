@@ -19,7 +19,7 @@ struct Glyph {
   float advance = 0;                   // of the pen, pixels
 };
 
-// Not thread-safe. Glyphs are kept.
+// Not thread-safe. Glyphs are kept, up to a limit.
 class Fonts {
  public:
   // As the constructor of TextPainter.

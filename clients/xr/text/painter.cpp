@@ -61,62 +61,83 @@ float TextPainter::width(std::string_view utf8, float pixels, Weight weight) {
   return width;
 }
 
-std::string TextPainter::fit(std::string_view utf8, float pixels, float most, Weight weight) {
-  if (width(utf8, pixels, weight) <= most) return std::string(utf8);
-  const float room = most - width(kEllipsis, pixels, weight);
-  float used = 0;
-  std::string_view rest = utf8;
-  std::size_t kept = 0;
-  while (!rest.empty()) {
-    used += fonts_->glyph(nextCharacter(rest), whole(pixels), weight).advance;
-    if (used > room) break;
-    kept = utf8.size() - rest.size();
-  }
-  return std::string(utf8.substr(0, kept)) + std::string(kEllipsis);
+void TextPainter::warm(float pixels, Weight weight) {
+  for (char32_t character = U' '; character <= U'~'; ++character)
+    fonts_->glyph(character, whole(pixels), weight);
+  width(kEllipsis, pixels, weight);
 }
 
-std::vector<std::string> TextPainter::wrap(std::string_view utf8, float pixels, float most,
-                                           std::size_t lines) {
-  std::vector<std::string> wrapped(1);
-  while (!utf8.empty()) {
-    const std::size_t end = std::min(utf8.find(' '), utf8.size());
-    const std::string word(utf8.substr(0, end));
-    const bool isLast = wrapped.size() == lines;
-    std::string& line = wrapped.back();
-    const std::string longer = line.empty() ? word : line + ' ' + word;
-    if (line.empty() || isLast || width(longer, pixels) <= most)
-      line = longer;
-    else
-      wrapped.push_back(word);
-    utf8.remove_prefix(std::min(end + 1, utf8.size()));
+TextPainter::Fitted TextPainter::fit(std::string_view utf8, float pixels, float most, Weight weight) {
+  const float ellipsis = width(kEllipsis, pixels, weight);
+  // The longest part that leaves room for the ellipsis, in case that there is more.
+  std::size_t kept = 0;
+  float keptWidth = 0, used = 0;
+  std::string_view rest = utf8;
+  while (!rest.empty()) {
+    used += fonts_->glyph(nextCharacter(rest), whole(pixels), weight).advance;
+    if (used > most) return {utf8.substr(0, kept), true, keptWidth + ellipsis};
+    if (used > most - ellipsis) continue;
+    kept = utf8.size() - rest.size();
+    keptWidth = used;
   }
-  for (std::string& line : wrapped) line = fit(line, pixels, most);
-  return wrapped;
+  return {utf8, false, used};
+}
+
+void TextPainter::wrap(std::string_view utf8, float pixels, float most, std::size_t lines,
+                       std::vector<std::string_view>& out) {
+  out.assign(1, utf8.substr(0, 0));
+  const float space = width(" ", pixels);
+  float used = 0;  // of the last line
+  for (std::size_t begin = 0; begin < utf8.size();) {
+    const std::size_t end = std::min(utf8.find(' ', begin), utf8.size());
+    const std::string_view word = utf8.substr(begin, end - begin);
+    const float wordWidth = width(word, pixels);
+    std::string_view& line = out.back();
+    const auto lineStart = static_cast<std::size_t>(line.data() - utf8.data());
+    if (line.empty()) {
+      line = word;
+      used = wordWidth;
+    } else if (out.size() == lines) {
+      line = utf8.substr(lineStart);
+      return;
+    } else if (used + space + wordWidth <= most) {
+      line = utf8.substr(lineStart, end - lineStart);
+      used += space + wordWidth;
+    } else {
+      out.push_back(word);
+      used = wordWidth;
+    }
+    begin = end + 1;
+  }
 }
 
 void TextPainter::write(Picture& picture, std::string_view utf8, float x, float y, float pixels, Ink ink,
-                        Align align, Weight weight) {
+                        Align align, Weight weight, float most) {
   const std::uint32_t size = whole(pixels);
-  if (align != Align::kLeft) x -= width(utf8, pixels, weight) * (align == Align::kCentre ? 0.5F : 1.0F);
+  const Fitted fitted = fit(utf8, pixels, most, weight);
+  if (align != Align::kLeft) x -= fitted.width * (align == Align::kCentre ? 0.5F : 1.0F);
   const int baseLine = static_cast<int>(std::lround(y + fonts_->capHeight(size, weight) / 2));
-  while (!utf8.empty()) {
-    const Glyph& glyph = fonts_->glyph(nextCharacter(utf8), size, weight);
-    drawGlyph(picture, glyph, static_cast<int>(std::lround(x)) + glyph.left, baseLine - glyph.top, ink);
-    x += glyph.advance;
+  for (std::string_view part : {fitted.text, fitted.isCut ? kEllipsis : std::string_view()}) {
+    while (!part.empty()) {
+      const Glyph& glyph = fonts_->glyph(nextCharacter(part), size, weight);
+      drawGlyph(picture, glyph, static_cast<int>(std::lround(x)) + glyph.left, baseLine - glyph.top, ink);
+      x += glyph.advance;
+    }
   }
 }
 
 std::shared_ptr<const Picture> TextPainter::label(std::string_view name, Ink border) {
   auto picture = std::make_shared<Picture>();
-  const std::string text = fit(name, kLabelPixels, kLabelMost - 2 * kLabelPadding, Weight::kBold);
-  const auto textWidth = static_cast<std::uint32_t>(std::ceil(width(text, kLabelPixels, Weight::kBold)));
+  constexpr float kRoom = kLabelMost - 2 * kLabelPadding;
+  const auto textWidth =
+      static_cast<std::uint32_t>(std::ceil(fit(name, kLabelPixels, kRoom, Weight::kBold).width));
   clear(*picture, std::min(kLabelMost, textWidth + 2 * kLabelPadding), kLabelHeight);
   const auto wide = static_cast<float>(picture->width);
   constexpr auto kHigh = static_cast<float>(kLabelHeight);
   drawRounded(*picture, 0, 0, wide, kHigh, kHigh / 2, {0x14, 0x16, 0x1b, 0xd8});
   drawRounded(*picture, 1, 1, wide - 2, kHigh - 2, kHigh / 2 - 1, border, 4);
-  write(*picture, text, wide / 2, kHigh / 2, kLabelPixels, {0xf4, 0xf2, 0xee, 255}, Align::kCentre,
-        Weight::kBold);
+  write(*picture, name, wide / 2, kHigh / 2, kLabelPixels, {0xf4, 0xf2, 0xee, 255}, Align::kCentre,
+        Weight::kBold, kRoom);
   touch(*picture);
   return picture;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -33,15 +34,24 @@ class TextPainter {
   const std::string& fontFile() const { return fontFile_; }
   // Width of a text in pixels. `pixels` is the size of the font.
   float width(std::string_view utf8, float pixels, Weight weight = Weight::kRegular);
-  // Lines of at most `most` pixels. A word that is wider stands alone, and is cut when it is drawn. At most
-  // `lines` lines; the last one ends with an ellipsis if there is more.
-  std::vector<std::string> wrap(std::string_view utf8, float pixels, float most, std::size_t lines);
-  // The text, or its start with an ellipsis if it is wider than `most` pixels.
-  std::string fit(std::string_view utf8, float pixels, float most, Weight weight = Weight::kRegular);
-  // Draws a text at `x`, vertically centred at `y` on the height of capital letters. Characters that no font
-  // has are drawn as boxes; malformed UTF-8 as U+FFFD.
+  // Loads the glyphs of ASCII, so that texts of them allocate nothing later.
+  void warm(float pixels, Weight weight);
+  // Replaces `out` by the parts of the text that are its lines of at most `most` pixels, 1 to `lines` of
+  // them. A word that is wider, and the last line if there is more, are cut when they are drawn.
+  void wrap(std::string_view utf8, float pixels, float most, std::size_t lines,
+            std::vector<std::string_view>& out);
+  // Part of a text that is drawn within `most` pixels: all of it, or its start, which an ellipsis follows.
+  struct Fitted {
+    std::string_view text;
+    bool isCut = false;
+    float width = 0;  // with the ellipsis, pixels
+  };
+  Fitted fit(std::string_view utf8, float pixels, float most, Weight weight = Weight::kRegular);
+  // Draws a text at `x`, vertically centred at `y` on the height of capital letters, and cuts it if it is
+  // wider than `most` pixels. Characters that no font has are drawn as boxes; malformed UTF-8 as U+FFFD.
   void write(Picture& picture, std::string_view utf8, float x, float y, float pixels, Ink ink,
-             Align align = Align::kLeft, Weight weight = Weight::kRegular);
+             Align align = Align::kLeft, Weight weight = Weight::kRegular,
+             float most = std::numeric_limits<float>::infinity());
 
   // A name in a pill with a border of this colour, for a label in space.
   std::shared_ptr<const Picture> label(std::string_view name, Ink border);
