@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Pictures of a stage without a server, by their properties. CLOTHSTREAM_XR_PICTURES names a folder for
 // copies to look at.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -160,6 +162,30 @@ TEST_F(RendererTest, ClothCastsItsShadowOnTheFloor) {
   keep(drawn, "shadow");
   EXPECT_LT(drawn.at(place->x, place->y).brightness(), lit * 85 / 100);
   EXPECT_NEAR(drawn.at(250, 250).brightness(), cornerBefore, 6);
+}
+
+// A woven sheet in waves, in light that grazes some of them, has no single pixel that is much brighter or
+// darker than all four around it. Such dots were at edges of triangles, where derivatives were wrong.
+TEST_F(RendererTest, NoPixelOfClothStandsOut) {
+  Drawn drawn(device(), 256, 1);
+  Stage stage = sampleStage(kSide);
+  tests::wave(stage, 1);
+  const std::array<View, 1> near{look({0.2f, 1.1f, 1.2f}, {0, 1, 0}, 0.3f)};  // the sheet fills the picture
+  drawn.draw(stage, near);
+  keep(drawn, "smooth");
+  int most = 0;
+  for (std::uint32_t y = 1; y < 255; ++y)
+    for (std::uint32_t x = 1; x < 255; ++x) {
+      const int here = drawn.at(x, y).brightness();
+      int above = 765, below = 765;  // least differences from those around
+      for (const auto& [column, row] : {std::pair{x - 1, y}, {x + 1, y}, {x, y - 1}, {x, y + 1}}) {
+        const int difference = here - drawn.at(column, row).brightness();
+        above = std::min(above, difference);
+        below = std::min(below, -difference);
+      }
+      most = std::max({most, above, below});
+    }
+  EXPECT_LT(most, 30);
 }
 
 TEST_F(RendererTest, ClothHasTwoSides) {

@@ -88,9 +88,13 @@ VkShaderStageFlags stagesOf(std::uint32_t binding) {
 
 Owned<VkPipeline> graphicsPipeline(VkDevice device, const RendererOptions& options, const Passes& passes,
                                    VkPipelineLayout layout, VkPipelineCache cache, const Design& design) {
-  const std::uint32_t fullShadows = options.shadows == ShadowDetail::kFull ? 1 : 0;
-  const VkSpecializationMapEntry entry{0, 0, sizeof(fullShadows)};
-  const VkSpecializationInfo specialization{1, &entry, sizeof(fullShadows), &fullShadows};
+  // Constants of light.glsl.
+  const std::array<std::uint32_t, 2> constants{options.shadows == ShadowDetail::kFull ? 1U : 0U,
+                                               options.hasDensity ? 0U : 1U};
+  constexpr std::array<VkSpecializationMapEntry, 2> kEntries{
+      {{0, 0, sizeof(std::uint32_t)}, {1, sizeof(std::uint32_t), sizeof(std::uint32_t)}}};
+  const VkSpecializationInfo specialization{kEntries.size(), kEntries.data(), sizeof(constants),
+                                            constants.data()};
   const Owned<VkShaderModule> vertex = module(device, design.vertex);
   const Owned<VkShaderModule> fragment =
       design.isShadow ? Owned<VkShaderModule>() : module(device, design.fragment);

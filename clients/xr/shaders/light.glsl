@@ -9,12 +9,15 @@ layout(set = 0, binding = kShadowBinding) uniform sampler2DShadow shadowMap;
 
 // 1: shadows are softer with the distance from what casts them.
 layout(constant_id = 0) const uint kFullShadows = 1;
+// 1: the fragments of a quad share what they find in the shadow map. Quads of fragments that are larger than
+// pixels are elsewhere.
+layout(constant_id = 1) const uint kSharesQuads = 1;
 
 // Percentage-closer soft shadows (Fernando 2005), with the numbers of the page
 // (clients/web/page/src/soft_shadow.ts).
 const float kTexels = 2048.0;
 const float kDepthPerWidth = 3.2 / 8.0;
-const float kSteepest = 6.0 * kDepthPerWidth;
+const float kSteepest = 6.0 * kDepthPerWidth;  // slope up to which disks are round
 const float kCurvature = 0.9 * kDepthPerWidth;
 const float kUvPerDepth = 0.14 / 2.0 / kDepthPerWidth;
 const float kSearchDepth = 0.25;
@@ -28,48 +31,92 @@ vec2 diskSample(int index, int count, float turn) {
   return sqrt((float(index) + 0.5) / float(count)) * vec2(cos(angle), sin(angle));
 }
 
+// A place in the shadow map, and the plane of the surface there.
+struct MapPlace {
+  vec3 coord;
+  vec2 slope;    // of depth along the plane
+  mat2 squeeze;  // makes disks narrow along the slope of steep planes, which would else shade themselves
+};
+
+// Coordinates and depth of the plane at a place on a disk, with the tolerance for curvature.
+vec3 planeAt(MapPlace at, vec2 onDisk) {
+  vec2 offset = at.squeeze * onDisk;
+  return vec3(at.coord.xy + offset, at.coord.z + dot(at.slope, offset) - kCurvature * length(onDisk));
+}
+
 // Part of a disk of the map that does not shade the surface.
-float litPart(vec3 coord, vec2 slope, float turn, float radius, int samples) {
+float litPart(MapPlace at, float turn, float radius, int samples) {
   float lit = 0.0;
-  for (int i = 0; i < samples; ++i) {
-    vec2 offset = radius * diskSample(i, samples, turn);
-    lit += texture(shadowMap,
-                   vec3(coord.xy + offset, coord.z + dot(slope, offset) - kCurvature * length(offset)));
-  }
+  for (int i = 0; i < samples; ++i)
+    lit += textureLod(shadowMap, planeAt(at, radius * diskSample(i, samples, turn)), 0.0);
   return lit / float(samples);
 }
 
-// Light of the key light that arrives, 0 to 1. `normal` is that of the geometry, on the side of the viewer.
-float keyLit(vec3 place, vec3 normal) {
+// Place in the map of a point that is moved off its surface, towards the light. `normal` is that of the
+// geometry; a smooth one also moves triangles of a curved surface off those around them. The plane is that of
+// the triangle: derivatives of the moved point would follow the normal, which turns around where light grazes
+// the surface.
+MapPlace mapPlaceOf(vec3 place, vec3 normal) {
+  vec3 px = dFdx(place);
+  vec3 py = dFdy(place);
   vec3 offset = faceforward(normal, -frame.keyDirection.xyz, normal) * frame.keyLight.w;
-  vec3 coord = (frame.shadow * vec4(place + offset, 1.0)).xyz;
-  // Slope of depth along the surface in map coordinates. It prevents inclined surfaces from shading
-  // themselves.
-  vec3 dx = dFdx(coord);
-  vec3 dy = dFdy(coord);
-  if (any(lessThan(coord, vec3(0.0))) || any(greaterThan(coord, vec3(1.0)))) return 1.0;
+  MapPlace at;
+  at.coord = (frame.shadow * vec4(place + offset, 1.0)).xyz - vec3(0.0, 0.0, 0.0005);
+  vec3 dx = mat3(frame.shadow) * px;
+  vec3 dy = mat3(frame.shadow) * py;
   float area = dx.x * dy.y - dx.y * dy.x;
-  vec2 slope = vec2(dy.y * dx.z - dx.y * dy.z, dx.x * dy.z - dy.x * dx.z) / (abs(area) > 1e-12 ? area : 1.0);
-  slope *= min(1.0, kSteepest / max(length(slope), 1e-6));
-  coord.z -= 0.0005;
-  // Interleaved gradient noise turns the disk per pixel, so that bands of few samples become noise.
-  float turn = 6.2831853 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
-  if (kFullShadows == 0) return litPart(coord, slope, turn, kCheapRadius, kCheapSamples);
+  if (abs(area) < 1e-18) area = 1e-18;
+  at.slope = vec2(dy.y * dx.z - dx.y * dy.z, dx.x * dy.z - dy.x * dx.z) / area;
+  float steepness = length(at.slope);
+  vec2 along = at.slope / max(steepness, 1e-6);
+  at.squeeze = mat2(1.0) - max(0.0, 1.0 - kSteepest / max(steepness, 1e-6)) * outerProduct(along, along);
+  return at;
+}
+
+// Average over the four fragments of a quad. Its call is in uniform control flow.
+float quadAverage(float value) {
+  if (kSharesQuads == 0) return value;
+  vec2 towards = 1.0 - 2.0 * mod(floor(gl_FragCoord.xy), 2.0);
+  value += 0.5 * towards.x * dFdxFine(value);
+  return value + 0.5 * towards.y * dFdyFine(value);
+}
+
+// Turn of the disks of a fragment. Interleaved gradient noise turns them per quad, so that bands of few
+// samples become noise; the fragments of a quad complete each other.
+float diskTurn() {
+  vec2 quad = floor(0.5 * gl_FragCoord.xy);
+  vec2 inQuad = mod(floor(gl_FragCoord.xy), 2.0);
+  return 6.2831853 * fract(52.9829189 * fract(dot(quad, vec2(0.06711056, 0.00583715)))) +
+         1.5707963 * (inQuad.x + 2.0 * inQuad.y);
+}
+
+// Light of the key light that arrives, 0 to 1. `normal` is that of the geometry.
+float keyLit(vec3 place, vec3 normal) {
+  MapPlace at = mapPlaceOf(place, normal);
+  bool isInside = all(greaterThan(at.coord, vec3(0.0))) && all(lessThan(at.coord, vec3(1.0)));
+  float turn = diskTurn();
+  if (kFullShadows == 0) return isInside ? litPart(at, turn, kCheapRadius, kCheapSamples) : 1.0;
   float blockers = 0.0;
   float blockerDepth = 0.0;
   for (int i = 0; i < kSearchSamples; ++i) {
-    vec2 at = kUvPerDepth * kSearchDepth * diskSample(i, kSearchSamples, turn);
-    float depth = textureLod(shadowDepths, coord.xy + at, 0.0).r;
-    if (depth < coord.z + dot(slope, at) - kCurvature * length(at)) {
+    vec2 onDisk = diskSample(i, kSearchSamples, turn);
+    // Most samples are near the middle: what is near the surface shades it from there only.
+    vec3 plane = planeAt(at, kUvPerDepth * kSearchDepth * length(onDisk) * onDisk);
+    float depth = textureLod(shadowDepths, plane.xy, 0.0).r;
+    if (isInside && depth < plane.z) {
       blockers += 1.0;
-      blockerDepth += depth;
+      blockerDepth += at.coord.z - depth;
     }
   }
-  if (blockers == 0.0) return 1.0;
-  float radius = max(kUvPerDepth * (coord.z - blockerDepth / blockers), 1.5 / kTexels);
-  float lit = litPart(coord, slope, turn, radius, kFilterSamples);
-  // Few blockers: the shadow fades out, so that pixels whose search finds none do not stand out.
-  return mix(1.0, lit, min(1.0, blockers / 3.0));
+  blockers = quadAverage(blockers);
+  blockerDepth = quadAverage(blockerDepth);
+  float lit = 1.0;
+  if (blockers > 0.1) {  // a quarter at least, or rounding
+    float radius = max(kUvPerDepth * blockerDepth / blockers, 1.5 / kTexels);
+    lit = litPart(at, turn, radius, kFilterSamples);
+  }
+  // Few blockers: the shadow fades out, so that quads whose search finds none do not stand out.
+  return mix(1.0, quadAverage(lit), min(1.0, blockers));
 }
 
 // Irradiance of the surroundings (Ramamoorthi and Hanrahan 2001).

@@ -45,15 +45,16 @@ void main() {
   m.sheenRoughness = part.sheen.y;
   m.translucency = part.sheen.w;
   m.reflection = part.look.y;
-  vec2 uv = inWeave * part.look.z;
-  vec4 threads = texture(weaveColours, vec3(uv, part.look.w));
-  vec4 relief = texture(weaveReliefs, vec3(uv, part.look.w));
-  vec3 shaded = normal;
+  // Derivatives are those of inputs alone. Mesa's software device reads zeros from buffers in helper
+  // invocations, so that derivatives of anything else are wrong in quads at edges of triangles, and in
+  // branches on it.
+  vec4 threads = texture(weaveColours, vec3(inWeave, part.look.w));
+  vec4 relief = texture(weaveReliefs, vec3(inWeave, part.look.w));
+  vec3 shaded = bent(normal, part.look.x * (2.0 * relief.xy - 1.0), inWeave);
   if (part.look.z > 0.0) {
     // A texel of 200 in sRGB encoding leaves the colour as it is.
     m.colour *= threads.rgb * 1.706;
     m.roughness *= relief.w;
-    shaded = bent(normal, part.look.x * (2.0 * relief.xy - 1.0), uv);
   }
   if (!gl_FrontFacing) m.colour *= part.sheen.z;
   m.colour = min(m.colour, vec3(0.95));
