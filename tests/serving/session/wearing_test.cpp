@@ -145,7 +145,7 @@ TEST_F(WearingTest, ErrorsSayWhatIsWrongAndChangeNothing) {
   }
   EXPECT_EQ(bodyOf(peer.welcome().participant_id()), "avatar");
   EXPECT_EQ(bodyOf(other.welcome().participant_id()), "");
-  EXPECT_EQ(live().definition().colliders[2].motion.keys.front().position.x(), -2);
+  EXPECT_EQ(live().definition().colliders[2].pose.position.x(), -2);
 }
 
 // The collider of a body stands by a change of parameters, which the server refuses if there were too many.
