@@ -73,13 +73,13 @@ clients/xr         | clients/xr/connection clients/xr/flat clients/xr/openxr
 clients/xr/geometry |
 clients/xr/text    |
 clients/xr/timing  |
-clients/xr/connection |
+clients/xr/connection | proto/text
 clients/xr/stage   | clients/xr/geometry clients/xr/text proto/hands
 clients/xr/panel   | clients/xr/stage clients/xr/text
 clients/xr/shaders |
 clients/xr/render  | clients/xr/shaders clients/xr/stage
 clients/xr/input   | clients/xr/geometry proto/hands
-clients/xr/visit   | clients/xr/connection clients/xr/input clients/xr/panel clients/xr/stage clients/xr/timing
+clients/xr/visit   | proto/text clients/xr/connection clients/xr/input clients/xr/panel clients/xr/stage clients/xr/timing
 clients/xr/flat    | clients/xr/geometry clients/xr/render clients/xr/visit
 clients/xr/openxr  | clients/xr/input clients/xr/render clients/xr/stage clients/xr/timing clients/xr/visit
 '

@@ -43,10 +43,8 @@ void StreamLog::nextAttempt(std::chrono::microseconds in) {
 }
 
 void StreamLog::ended(const Failure& why, bool left) {
-  if (left)
-    say(LogLevel::info, "left the scene");
-  else
-    say(LogLevel::error, why.text);
+  if (!left) return say(LogLevel::error, why.text);
+  if (joined_) say(LogLevel::info, "left the scene");
 }
 
 }  // namespace clothstream

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `clothstream-xr`: shows a scene of clothstream-server in a headset, or flat.
 #include <chrono>
-#include <csignal>
-#include <ctime>
+#include <cstdlib>
 #include <exception>
 #include <stdexcept>
 #include <string>
@@ -10,6 +9,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "clients/xr/ending.h"
 #include "clients/xr/program_options.h"
 
 namespace {
@@ -17,21 +17,13 @@ namespace {
 using namespace clothstream::xr;
 using namespace std::chrono_literals;
 
-sigset_t endingSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  return signals;
-}
+constexpr int kFailed = 1, kInvalidOptions = 2;  // exit statuses
 
-// Whether the program is asked to end, once or before. Waits for this time.
-bool isEnding(std::chrono::nanoseconds wait = 0ns) {
-  static bool ends = false;
-  const sigset_t signals = endingSignals();
-  const timespec timeout{.tv_sec = 0, .tv_nsec = wait.count()};
-  ends = ends || sigtimedwait(&signals, nullptr, &timeout) > 0;
-  return ends;
+// libclothstream does not allow the options; the log says why.
+struct OptionsNotAllowed {};
+
+void checkOptions(const Visit& visit) {
+  if (visit.connection().isInvalid()) throw OptionsNotAllowed();
 }
 
 // Logs the cost of frames once a second.
@@ -47,7 +39,8 @@ void logCosts(const Visit& visit, std::uint64_t nowUs) {
 
 // Shows frames until the runtime is lost (true) or the program ends (false). Throws an XrError if it is lost
 // in a call. Adds 1 to the number of sessions when there is one.
-bool showUntilLost(const HeadsetOptions& options, Visit& visit, std::uint64_t& sessions) {
+bool showUntilLost(const HeadsetOptions& options, Visit& visit, const Ending& ending,
+                   std::uint64_t& sessions) {
   Headset headset(options, visit);
   if (sessions++ > 0) visit.say("The OpenXR runtime has started again", clothstream_now_us());
   // The runtime ends the session in its own time, but not for longer than this.
@@ -64,29 +57,30 @@ bool showUntilLost(const HeadsetOptions& options, Visit& visit, std::uint64_t& s
     }
     const std::uint64_t nowUs = clothstream_now_us();
     logCosts(visit, nowUs);
-    if (exitUs == 0 && (isEnding() || visit.leaves())) {
+    checkOptions(visit);
+    if (exitUs == 0 && (ending.isWanted() || visit.leaves())) {
+      if (!headset.requestExit()) return false;
       exitUs = nowUs + kLongestExitUs;
-      headset.requestExit();
     }
     if (exitUs != 0 && nowUs > exitUs) return false;
   }
 }
 
 // Returns the exit status.
-int showInHeadsets(const ProgramOptions& options, Visit& visit) {
+int showInHeadsets(const ProgramOptions& options, Visit& visit, Ending& ending) {
   std::string said;
   std::uint64_t lostUs = clothstream_now_us(), sessions = 0;
-  while (!isEnding() && !visit.leaves()) {
-    const std::uint64_t framesBefore = visit.frameTimes().total(), sessionsBefore = sessions;
+  while (!ending.isWanted() && !visit.leaves()) {
+    const std::uint64_t sessionsBefore = sessions;
     std::string error;
     try {
-      if (!showUntilLost(options.headset, visit, sessions)) return 0;
+      if (!showUntilLost(options.headset, visit, ending, sessions)) return 0;
       error = "The OpenXR session is lost";
     } catch (const XrError& lost) {
       error = lost.what();
     } catch (const std::runtime_error& lost) {
-      // A device that has drawn frames may do so again; else something is missing.
-      if (visit.frameTimes().total() == framesBefore) throw;
+      // A machine that has drawn frames may do so again; else something is missing.
+      if (visit.frameTimes().total() == 0) throw;
       error = lost.what();
     }
     const std::uint64_t nowUs = clothstream_now_us();
@@ -100,45 +94,75 @@ int showInHeadsets(const ProgramOptions& options, Visit& visit) {
     }
     if (options.waitForRuntime >= 0 && static_cast<double>(nowUs - lostUs) > options.waitForRuntime * 1e6) {
       spdlog::error("No headset within {} s (--wait)", options.waitForRuntime);
-      return 1;
+      return kFailed;
     }
     // The scene goes on without a headset.
-    while (clothstream_now_us() - nowUs < 1'000'000 && !isEnding(50ms)) visit.hidden(clothstream_now_us());
+    while (clothstream_now_us() - nowUs < 1'000'000 && !ending.wait(50ms)) {
+      visit.hidden(clothstream_now_us());
+      checkOptions(visit);
+    }
   }
   return 0;
 }
 
-int showFlat(const ProgramOptions& options, Visit& visit) {
+// Returns the exit status.
+int showFlat(const ProgramOptions& options, Visit& visit, const Ending& ending) {
   Flat flat(options.flat, visit);
-  while (!isEnding() && flat.step()) logCosts(visit, clothstream_now_us());
+  for (bool goesOn = true; goesOn && !ending.isWanted();) {
+    goesOn = flat.step();
+    checkOptions(visit);
+    logCosts(visit, clothstream_now_us());
+  }
   spdlog::info("{}", flat.summary());
-  return 0;
+  const Connection& connection = visit.connection();
+  if (connection.clientNumber() > 0 || ending.isWanted() || visit.leaves()) return 0;
+  spdlog::error("No scene was shown. {}", connection.trouble().title.empty() ? "The server has not answered"
+                                                                             : connection.trouble().title);
+  return kFailed;
+}
+
+// Returns the exit status.
+int show(const ProgramOptions& options, Visit& visit, Ending& ending) {
+  try {
+    return options.isFlat ? showFlat(options, visit, ending) : showInHeadsets(options, visit, ending);
+  } catch (const OptionsNotAllowed&) {
+    return kInvalidOptions;
+  } catch (const std::exception& error) {
+    spdlog::error("{}", error.what());
+    return kFailed;
+  }
+}
+
+// Returns the exit status of the program, whose parts have given another one.
+int statusOf(int exitCode) {
+  const std::uint64_t messages = validationMessages() + openXrValidationMessages();
+  if (messages == 0) return exitCode;
+  spdlog::error("{} messages of validation layers", messages);
+  return kFailed;
 }
 
 }  // namespace
 
 int main(int count, char** arguments) {
-  const sigset_t signals = endingSignals();
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  Ending ending;
   int exitCode = 0;
   const auto options = readOptions(count, arguments, exitCode);
   if (!options) return exitCode;
   spdlog::set_default_logger(spdlog::stderr_color_mt("clothstream-xr"));
   spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
   spdlog::set_level(options->isVerbose ? spdlog::level::debug : spdlog::level::info);
+  // Without a runtime, the loader of OpenXR would explain it in five lines at each attempt.
+  if (!options->isVerbose) setenv("XR_LOADER_DEBUG", "none", 0);
   try {
     openVulkanLoader();
     TextPainter painter(options->font);
     Visit visit(options->connection, painter);
-    exitCode = options->isFlat ? showFlat(*options, visit) : showInHeadsets(*options, visit);
+    exitCode = show(*options, visit, ending);
+    // An attempt to join may wait for the network for seconds, and has nothing to leave.
+    if (visit.leave()) std::_Exit(statusOf(exitCode));
   } catch (const std::exception& error) {
     spdlog::error("{}", error.what());
-    exitCode = 1;
+    exitCode = kFailed;
   }
-  const std::uint64_t messages = validationMessages() + openXrValidationMessages();
-  if (messages > 0) {
-    spdlog::error("{} messages of validation layers", messages);
-    exitCode = 1;
-  }
-  return exitCode;
+  return statusOf(exitCode);
 }

@@ -6,6 +6,9 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -16,8 +19,9 @@ namespace {
 // Token in a file, without the space around it.
 std::string readToken(const std::string& file) {
   std::ifstream in(file);
+  if (!in) throw CLI::ValidationError("--token", fmt::format("{} cannot be read", file));
   std::string token;
-  in >> token;
+  in >> std::setw(CLOTHSTREAM_TOKEN_BYTES) >> token;
   if (token.empty()) throw CLI::ValidationError("--token", fmt::format("{} has no token", file));
   if (token.size() >= CLOTHSTREAM_TOKEN_BYTES)
     throw CLI::ValidationError("--token",
@@ -31,6 +35,32 @@ std::string sixDigits(std::string& code) {
       code.size() == 6 && std::ranges::all_of(code, [](unsigned char c) { return std::isdigit(c); });
   return isCode ? ""
                 : fmt::format("\"{}\" is no pairing code; use the six digits that the server shows", code);
+}
+
+// A number within bounds. CLI::Range accepts what is not a number.
+CLI::Validator within(double least, double most) {
+  const auto check = [least, most](std::string& text) -> std::string {
+    double number = 0;
+    const bool isWithin = CLI::detail::lexical_cast(text, number) && number >= least && number <= most;
+    return isWithin ? "" : fmt::format("\"{}\" is not a number from {} to {}", text, least, most);
+  };
+  return {check, fmt::format("[{} - {}]", least, most)};
+}
+
+// A name, which stands for a value.
+template <typename Value>
+CLI::Validator oneOf(const std::vector<std::pair<std::string, Value>>& choices) {
+  std::string names;
+  for (const auto& [name, value] : choices) names += (names.empty() ? "" : ", ") + name;
+  const auto replace = [choices, names](std::string& text) -> std::string {
+    for (const auto& [name, value] : choices) {
+      if (text != name) continue;
+      text = std::to_string(static_cast<std::uint32_t>(value));
+      return "";
+    }
+    return fmt::format("\"{}\" is not allowed; use one of: {}", text, names);
+  };
+  return {replace, fmt::format("{{{}}}", names)};
 }
 
 void addConnection(CLI::App& app, ProgramOptions& options, std::string& tokenFile) {
@@ -58,15 +88,14 @@ void addConnection(CLI::App& app, ProgramOptions& options, std::string& tokenFil
       ->check(CLI::Range(0, 3));
   app.add_option("--role", connection.role,
                  "Role to request: viewer, participant or owner. Default: the server chooses")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, std::uint32_t>{
-          {"viewer", CS_ROLE_VIEWER}, {"participant", CS_ROLE_PARTICIPANT}, {"owner", CS_ROLE_OWNER}}));
+      ->transform(oneOf<std::uint32_t>(
+          {{"viewer", CS_ROLE_VIEWER}, {"participant", CS_ROLE_PARTICIPANT}, {"owner", CS_ROLE_OWNER}}));
   app.add_option(
          "--transport", connection.transport,
          "Way of frames and input: datagrams, tcp, or auto (datagrams where they arrive). Default: auto")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, std::uint32_t>{{"auto", CLOTHSTREAM_TRANSPORT_AUTO},
-                                               {"datagrams", CLOTHSTREAM_TRANSPORT_DATAGRAMS},
-                                               {"tcp", CLOTHSTREAM_TRANSPORT_TCP}}));
+      ->transform(oneOf<std::uint32_t>({{"auto", CLOTHSTREAM_TRANSPORT_AUTO},
+                                        {"datagrams", CLOTHSTREAM_TRANSPORT_DATAGRAMS},
+                                        {"tcp", CLOTHSTREAM_TRANSPORT_TCP}}));
 }
 
 void addHeadset(CLI::App& app, ProgramOptions& options) {
@@ -76,15 +105,22 @@ void addHeadset(CLI::App& app, ProgramOptions& options) {
   app.add_option(
          "--rate", headset.refreshRate,
          "Refresh rate of the headset in Hz, the nearest that it offers. Default: one that suits the stream")
-      ->check(CLI::Range(1.0, 1000.0));
+      ->check(within(1, 1000));
+  app.add_option("--foveation", headset.foveation,
+                 "Fewer samples at the edges of the view, where the headset can: off, low, medium or high. "
+                 "Default: low")
+      ->transform(oneOf<FoveationLevel>({{"off", FoveationLevel::kOff},
+                                         {"low", FoveationLevel::kLow},
+                                         {"medium", FoveationLevel::kMedium},
+                                         {"high", FoveationLevel::kHigh}}));
   app.add_option("--scale", headset.scale,
                  "Edges of the eyes' pictures, relative to what the runtime recommends. 0.1 to 2. Default: 1")
-      ->check(CLI::Range(0.1, 2.0));
+      ->check(within(0.1, 2));
   app.add_option(
          "--wait", options.waitForRuntime,
          "Seconds to wait for an OpenXR runtime with a headset, at the start and when it is lost. Default: "
          "without limit")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(within(0, 1e6));
   app.add_option("--eye-pictures", headset.eyePictures,
                  "Folder to which pictures of both eyes are written as PNG")
       ->check(CLI::ExistingDirectory);
@@ -135,8 +171,7 @@ std::optional<ProgramOptions> readOptions(int count, char** arguments, int& exit
   ShadowDetail shadows = ShadowDetail::kFull;
   app.add_option("--detail", shadows,
                  "full, or reduced: shadows of few samples, for weak graphics devices. Default: full")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, ShadowDetail>{
-          {"full", ShadowDetail::kFull}, {"reduced", ShadowDetail::kReduced}}));
+      ->transform(oneOf<ShadowDetail>({{"full", ShadowDetail::kFull}, {"reduced", ShadowDetail::kReduced}}));
   addHeadset(app, options);
   addFlat(app, options, flat);
   app.add_option("--font", options.font, "Font file for texts. Default: the sans-serif font of the system")

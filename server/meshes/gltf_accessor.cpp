@@ -35,12 +35,13 @@ tl::expected<GltfElements, std::string> elementsOf(const tinygltf::Model& model,
       std::int64_t{tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(accessor->componentType))} *
       tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor->type));
   if (stride <= 0 || size <= 0) return refuse("has a component type or stride that glTF does not have");
+  if (accessor->count == 0) return refuse("has no elements");
   const std::size_t bytes = buffer->data.size();
   const bool viewFits = view->byteOffset <= bytes && view->byteLength <= bytes - view->byteOffset;
   const bool startFits = viewFits && accessor->byteOffset <= view->byteLength;
   const std::size_t room = startFits ? view->byteLength - accessor->byteOffset : 0;
   const auto step = static_cast<std::size_t>(stride), last = static_cast<std::size_t>(size);
-  if (accessor->count == 0 || last > room || accessor->count - 1 > (room - last) / step)
+  if (last > room || accessor->count - 1 > (room - last) / step)
     return refuse(
         fmt::format("has {} elements, which its buffer of {} bytes does not hold", accessor->count, bytes));
   return GltfElements{buffer->data.data() + view->byteOffset + accessor->byteOffset, step, accessor->count,

@@ -11,6 +11,7 @@
 
 #include "proto/text/excerpt.h"
 #include "server/meshes/gltf_accessor.h"
+#include "server/meshes/gltf_name.h"
 #include "server/meshes/gltf_primitive.h"
 
 namespace clothstream::meshes {
@@ -146,6 +147,8 @@ Expected<std::vector<GltfChannel>> readChannels(const tinygltf::Model& model,
                                                 const tinygltf::Animation& animation,
                                                 const std::vector<int>& nodes,
                                                 const std::vector<Similarity>& poses, std::size_t keys) {
+  const std::string who =
+      namedPart("animation", animation.name, static_cast<std::size_t>(&animation - model.animations.data()));
   std::vector<GltfChannel> channels;
   std::set<std::pair<std::size_t, std::string>> known;
   std::unordered_map<int, std::size_t> placeOf;
@@ -156,12 +159,12 @@ Expected<std::vector<GltfChannel>> readChannels(const tinygltf::Model& model,
     if (found == placeOf.end()) continue;
     const std::size_t node = found->second;
     const auto refuse = [&](const std::string& text) {
-      return tl::unexpected(fmt::format("animation \"{}\", channel {} {}", animation.name, i, text));
+      return tl::unexpected(fmt::format("{}, channel {} {}", who, i, text));
     };
     const tinygltf::AnimationSampler* sampler = elementAt(animation.samplers, channel.sampler);
     if (!sampler) return refuse(fmt::format("has the sampler {}, which does not exist", channel.sampler));
     if (!known.emplace(node, channel.target_path).second)
-      return refuse(fmt::format("is the second one for the {} of node {}", channel.target_path.substr(0, 20),
+      return refuse(fmt::format("is the second one for the {} of node {}", excerpt(channel.target_path, 20),
                                 channel.target_node));
     if (channel.target_path == "scale") {
       if (auto done = checkScale(model, *sampler, poses[node].scale, keys); !done)
@@ -170,7 +173,7 @@ Expected<std::vector<GltfChannel>> readChannels(const tinygltf::Model& model,
     }
     if (channel.target_path != "translation" && channel.target_path != "rotation")
       return refuse(fmt::format("changes \"{}\", which is not supported: remove these keys",
-                                channel.target_path.substr(0, 20)));
+                                excerpt(channel.target_path, 20)));
     auto read = readChannel(
         model, *sampler,
         channel.target_path == "rotation" ? GltfChannel::Path::rotation : GltfChannel::Path::translation,

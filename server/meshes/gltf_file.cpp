@@ -22,6 +22,7 @@
 #include "server/files/regular_file.h"
 #include "server/meshes/gltf_attributes.h"
 #include "server/meshes/gltf_container.h"
+#include "server/meshes/gltf_name.h"
 #include "server/meshes/gltf_primitive.h"
 #include "server/meshes/gltf_skeleton.h"
 #include "server/meshes/gltf_skin.h"
@@ -91,7 +92,7 @@ class Gatherer {
       if (node->mesh >= 0) {
         const tinygltf::Mesh* mesh = elementAt(model_.meshes, node->mesh);
         if (!mesh) return tl::unexpected(fmt::format("mesh {} does not exist", node->mesh));
-        if (joints_ && node->skin < 0) rigidMesh_ = fmt::format("mesh \"{}\"", excerpt(mesh->name, 64));
+        if (joints_ && node->skin < 0) rigidMesh_ = nameOf(*mesh);
         const auto matrices = matricesOf(*node);
         if (!matrices) return tl::unexpected(matrices.error());
         const Placement placement{.transform = transform,
@@ -150,10 +151,15 @@ class Gatherer {
     return &matrices_.emplace(node.skin, std::move(*read)).first->second;
   }
 
+  // `mesh` is one of the model.
+  std::string nameOf(const tinygltf::Mesh& mesh) const {
+    return namedPart("mesh", mesh.name, static_cast<std::size_t>(&mesh - model_.meshes.data()));
+  }
+
   Expected<void> addMesh(const tinygltf::Mesh& mesh, const Placement& placement) {
     for (std::size_t i = 0; i < mesh.primitives.size(); ++i)
       if (auto done = addPrimitive(mesh, mesh.primitives[i], placement); !done)
-        return tl::unexpected(fmt::format("mesh \"{}\", primitive {}: {}", mesh.name, i, done.error()));
+        return tl::unexpected(fmt::format("{}, primitive {}: {}", nameOf(mesh), i, done.error()));
     return {};
   }
 

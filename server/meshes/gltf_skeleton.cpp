@@ -10,9 +10,9 @@
 
 #include <fmt/format.h>
 
-#include "proto/text/excerpt.h"
 #include "server/meshes/gltf_accessor.h"
 #include "server/meshes/gltf_channels.h"
+#include "server/meshes/gltf_name.h"
 #include "server/meshes/gltf_primitive.h"
 
 namespace clothstream::meshes {
@@ -48,6 +48,12 @@ std::optional<Similarity> similarityOf(const Eigen::Matrix4d& matrix) {
   return Similarity{matrix.topRightCorner<3, 1>(), Eigen::Quaterniond(turn).normalized(), scale};
 }
 
+bool hasNoRotation(const tinygltf::Node& node) {
+  return node.matrix.size() != 16 && node.rotation.size() == 4 &&
+         !(Eigen::Map<const Eigen::Vector4d>(node.rotation.data()).norm() > kSimilar);
+}
+
+// Nothing if the node is mirrored, or scaled differently along its axes. It must have a rotation.
 std::optional<Similarity> poseOf(const tinygltf::Node& node) {
   if (node.matrix.size() == 16) return similarityOf(Eigen::Map<const Eigen::Matrix4d>(node.matrix.data()));
   Eigen::Affine3d transform = Eigen::Affine3d::Identity();
@@ -55,7 +61,6 @@ std::optional<Similarity> poseOf(const tinygltf::Node& node) {
     transform.translate(Eigen::Map<const Eigen::Vector3d>(node.translation.data()));
   if (node.rotation.size() == 4) {
     const Eigen::Quaterniond q(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]);
-    if (!(q.norm() > kSimilar)) return std::nullopt;
     transform.rotate(q.normalized());
   }
   if (node.scale.size() == 3) transform.scale(Eigen::Map<const Eigen::Vector3d>(node.scale.data()));
@@ -76,8 +81,9 @@ double turnBetween(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return std::min((a.coeffs() - b.coeffs()).norm(), (a.coeffs() + b.coeffs()).norm());
 }
 
-std::string nameOf(const tinygltf::Skin& skin) {
-  return fmt::format("skin \"{}\"", excerpt(skin.name, 64));
+// `skin` is one of the model.
+std::string nameOf(const tinygltf::Model& model, const tinygltf::Skin& skin) {
+  return namedPart("skin", skin.name, static_cast<std::size_t>(&skin - model.skins.data()));
 }
 
 class SkeletonReader {
@@ -99,7 +105,8 @@ class SkeletonReader {
 
   // An error of one skin of several.
   tl::unexpected<std::string> refuse(const tinygltf::Skin& skin, const std::string& text) const {
-    return tl::unexpected(skins_.size() == 1 ? std::string(text) : fmt::format("{}: {}", nameOf(skin), text));
+    return tl::unexpected(skins_.size() == 1 ? std::string(text)
+                                             : fmt::format("{}: {}", nameOf(model_, skin), text));
   }
 
   // Lists each joint once, in the order of the skins.
@@ -159,7 +166,11 @@ class SkeletonReader {
 
   Done readPoses() {
     for (const int node : nodes_) {
-      const std::optional<Similarity> pose = poseOf(model_.nodes[static_cast<std::size_t>(node)]);
+      const tinygltf::Node& from = model_.nodes[static_cast<std::size_t>(node)];
+      if (hasNoRotation(from))
+        return tl::unexpected(
+            fmt::format("node {} has a rotation of length 0: export it as a quaternion of length 1", node));
+      const std::optional<Similarity> pose = poseOf(from);
       if (!pose)
         return tl::unexpected(
             fmt::format("node {} is mirrored, or scaled differently along its axes: apply its scale", node));
@@ -264,7 +275,7 @@ class SkeletonReader {
           return refuse(skin,
                         fmt::format("binds joint {} at another place than {}: join their meshes, or export "
                                     "both in the same pose",
-                                    i, nameOf(*boundBy[number])));
+                                    i, nameOf(model_, *boundBy[number])));
         if (boundBy[number]) continue;
         rests[number] = shared == binding.numberOf.end() ? bound->rests[i] : rest;
         boundBy[number] = &skin;
@@ -463,7 +474,8 @@ Expected<GltfSkeleton> readSkeleton(const tinygltf::Model& model, std::span<cons
     found.push_back(elementAt(model.skins, skin));
     if (!found.back()) return tl::unexpected(fmt::format("skin {} does not exist", skin));
   }
-  const std::string who = found.size() == 1 ? nameOf(*found[0]) : fmt::format("its {} skins", found.size());
+  const std::string who =
+      found.size() == 1 ? nameOf(model, *found[0]) : fmt::format("its {} skins", found.size());
   return SkeletonReader(model, std::move(found), request).read().map_error([&](const std::string& text) {
     return fmt::format("{}: {}", who, text);
   });

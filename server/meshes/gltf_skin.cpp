@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "server/meshes/gltf_name.h"
 #include "server/meshes/gltf_primitive.h"
 
 namespace clothstream::meshes {
@@ -107,7 +108,8 @@ Expected<std::vector<Affine3d>> jointMatrices(const tinygltf::Model& model, int 
   const tinygltf::Skin* found = elementAt(model.skins, skin);
   if (!found) return tl::unexpected(fmt::format("skin {} does not exist", skin));
   const auto refuse = [&](const std::string& text) {
-    return tl::unexpected(fmt::format("skin \"{}\": {}", found->name.substr(0, 64), text));
+    return tl::unexpected(
+        fmt::format("{}: {}", namedPart("skin", found->name, static_cast<std::size_t>(skin)), text));
   };
   const std::size_t count = found->joints.size();
   if (count == 0 || count > kMostJoints)
@@ -138,7 +140,10 @@ Expected<VertexInfluences> VertexInfluences::read(const tinygltf::Model& model,
                                                   const GltfPrimitive& read, std::size_t joints) {
   VertexInfluences influences;
   influences.joints_ = joints;
-  for (std::size_t i = 0; i == 0 || primitive.attributes.contains(fmt::format("JOINTS_{}", i)); ++i) {
+  const auto has = [&](const char* name, std::size_t i) {
+    return primitive.attributes.contains(fmt::format("{}_{}", name, i));
+  };
+  for (std::size_t i = 0; i == 0 || has("JOINTS", i) || has("WEIGHTS", i); ++i) {
     if (i == kMostSets)
       return tl::unexpected(
           fmt::format("has more than {} joints for a vertex: export it with at most four", 4 * kMostSets));
@@ -169,7 +174,9 @@ Expected<std::span<const Influence>> VertexInfluences::of(std::size_t vertex) {
       found_.push_back({joint, weight});
       sum += double{weight};
     }
-  if (found_.empty()) return tl::unexpected(fmt::format("vertex {} has no weight", vertex));
+  if (found_.empty())
+    return tl::unexpected(
+        fmt::format("vertex {} has no weight; its weights must add up to 1: assign it to a joint", vertex));
   for (Influence& influence : found_) influence.weight = static_cast<float>(double{influence.weight} / sum);
   return std::span<const Influence>(found_);
 }

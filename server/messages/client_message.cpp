@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "proto/text/visible.h"
+#include "server/messages/followed_place.h"
 #include "server/messages/grab_place.h"
 #include "server/messages/hands.h"
 #include "server/messages/limits.h"
@@ -99,18 +100,14 @@ void readAttachments(Checks& checks, const Path& poses, const v1::ColliderPoses&
   const auto nameOf = [](const model::Attachment* attachment) -> const std::string& {
     return attachment->name;
   };
-  const double reach = model::reachOf(scene.stream);
-  const model::Vec3 origin = model::originOf(scene);
   for (int i = 0; i < message.attachments_size() && !checks.failed(); ++i) {
     const v1::AttachmentPose& from = message.attachments(i);
     const Path path = poses.at("attachments", i);
     checkKnown(checks, path / "name", from.name(), known, v1::ERROR_CODE_NOT_FOUND, nameOf);
     const auto found = std::ranges::find(known, from.name(), nameOf);
     const model::Pose pose = toPose(checks, path / "pose", from.pose());
-    // Cloth that follows its attachment out of the stream's range would roll the scene back for everyone.
-    for (int axis = 0; axis < 3; ++axis)
-      checks.number(path / "pose", pose.position[axis],
-                    {.min = origin[axis] - reach, .max = origin[axis] + reach});
+    if (checks.failed()) return;
+    checkFollowedPlace(checks, path / "pose", pose.position, (*found)->pose.position, scene);
     to.attachments.push_back({static_cast<std::size_t>(found - known.begin()), pose, from.jumps()});
   }
 }
@@ -128,7 +125,8 @@ const model::Collider* findWithJoints(Checks& checks, const Path& path, const st
 }
 
 // Cloth that follows joints out of the stream's range would roll the scene back for everyone. The bound is
-// that of a sphere around the collider, which may be anywhere on its way.
+// that of a sphere around the collider, which may be anywhere on its way, or where a participant has put it
+// (checkFollowedPlace).
 void checkJointReach(Checks& checks, const Path& path, const model::Collider& collider,
                      const model::ColliderJoints& moved, const model::Scene& scene) {
   const auto follows = [&](const model::Cloth& cloth) {
@@ -144,16 +142,17 @@ void checkJointReach(Checks& checks, const Path& path, const model::Collider& co
   if (!collider.motion.keys.empty()) away = 0;
   for (const model::MotionKey& key : collider.motion.keys)
     away = std::max(away, (key.position - origin).cwiseAbs().maxCoeff());
-  const float most = model::reachOf(scene.stream);
+  const float left = model::reachOf(scene.stream) - std::max(away, mostFollowedDistance(scene));
   for (const model::Cloth& cloth : scene.cloths) {
     if (!follows(cloth)) continue;
+    // Free cloth swings around its place.
+    const float most = left - (cloth.skin->high - cloth.skin->low).norm();
     const float reach = model::motionBetween(cloth.skin->bounds, transforms, transforms).reach;
-    if (away + reach > most)
-      checks.fail(
-          path / "joints", "",
-          fmt::format("take the cloth \"{}\" up to {:.4g} m away from the middle of the scene; must stay "
-                      "within {:.4g} m, which the stream holds",
-                      cloth.name, away + reach, most));
+    if (reach > most)
+      checks.fail(path / "joints", "",
+                  fmt::format("take the cloth \"{}\" up to {:.4g} m away from its collider; must stay within "
+                              "{:.4g} m, so that the stream holds it wherever the collider is",
+                              cloth.name, reach, most));
   }
 }
 
@@ -225,15 +224,11 @@ Result<v1::ParameterChange> toWornBody(const v1::WearBody& message, const model:
   if (message.collider().empty()) return change;
   Checks checks;
   const Path path("wearBody");
-  findWithJoints(checks, path / "collider", message.collider(), scene);
+  const model::Collider* const found = findWithJoints(checks, path / "collider", message.collider(), scene);
   if (message.has_stands()) {
     const model::Pose stands = toPose(checks, path / "stands", message.stands());
-    // As for attachments: cloth that follows the body must stay in the stream's range.
-    const double reach = model::reachOf(scene.stream);
-    const model::Vec3 origin = model::originOf(scene);
-    for (int axis = 0; axis < 3; ++axis)
-      checks.number(path / "stands", stands.position[axis],
-                    {.min = origin[axis] - reach, .max = origin[axis] + reach});
+    if (const model::Collider* body = checks.failed() ? nullptr : found)
+      checkFollowedPlace(checks, path / "stands", stands.position, body->pose.position, scene);
     v1::ColliderChange& collider = *change.add_colliders();
     collider.set_name(message.collider());
     write(stands.position, *collider.mutable_position());

@@ -305,13 +305,29 @@ class ClothSkinReader {
     SkinLimits checked;
     applyLimits(checks_, path / "limits", limits, checked);
     if (checks_.failed()) return;
+    bool isEmpty = true;
     for (std::size_t node = 0; node < nodes_.size(); ++node) {
       if (!region.contains(nodes_[node])) continue;
+      isEmpty = false;
       SkinLimits& own = skin_.limits[node];
       if (limits.has_max_distance()) own.maxDistance = checked.maxDistance;
       if (limits.has_backstop_distance()) own.backstopDistance = checked.backstopDistance;
       if (limits.has_backstop_radius()) own.backstopRadius = checked.backstopRadius;
     }
+    if (isEmpty) failEmptyRegion(path / "region");
+  }
+
+  void failEmptyRegion(const Path& path) {
+    model::Vec3 low = nodes_[0], high = nodes_[0];
+    for (const model::Vec3& node : nodes_) {
+      low = low.cwiseMin(node);
+      high = high.cwiseMax(node);
+    }
+    checks_.fail(
+        path, "",
+        fmt::format("contains no node of the cloth, which is between ({:.4g} {:.4g} {:.4g}) and ({:.4g} "
+                    "{:.4g} {:.4g}) at rest: move the region, or make it larger",
+                    low.x(), low.y(), low.z(), high.x(), high.y(), high.z()));
   }
 
   // Joints alone move a node that follows them exactly.

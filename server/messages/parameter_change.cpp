@@ -13,6 +13,7 @@
 #include "proto/parameters/apply_change.h"
 #include "server/messages/client_message.h"
 #include "server/messages/cloth_message.h"
+#include "server/messages/followed_place.h"
 #include "server/messages/limits.h"
 #include "server/messages/parameter_numbers.h"
 #include "server/messages/scene_message.h"
@@ -117,7 +118,10 @@ model::ColliderChange toColliderChange(Checks& checks, const Path& path, const v
   if (message.has_friction())
     change.friction = checks.number(path / "friction", message.friction(), limits::kFriction);
   if (checks.failed()) return change;
-  model::Shape shape = std::ranges::find(scene.colliders, change.name, &model::Collider::name)->shape;
+  const model::Collider& collider = *std::ranges::find(scene.colliders, change.name, &model::Collider::name);
+  if (change.position && isFollowed(scene, change.name))
+    checkFollowedPlace(checks, path / "position", *change.position, collider.pose.position, scene);
+  model::Shape shape = collider.shape;
   const auto needs = [&](const char* field, const std::string& value, bool has, const char* what) {
     if (!has)
       checks.fail(path / field, value, fmt::format("must be absent: \"{}\" is {}", change.name, what));

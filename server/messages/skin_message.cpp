@@ -77,7 +77,7 @@ model::VertexJoints toVertexJoints(Checks& checks, const Path& path,
   }
   if (!checks.failed() && std::abs(sum - 1) > kWeightTolerance)
     checks.fail(path.at("vertexWeights", first), "",
-                fmt::format("and the next three add up to {}; must add up to 1", sum));
+                fmt::format("and the next three add up to {:.4g}; must add up to 1", sum));
   // Weights that were normalised before keep their bits, so that a recorded scene is the same.
   if (std::abs(sum - 1) > kNormalised)
     for (float& weight : joints.weights) weight = static_cast<float>(double{weight} / sum);
@@ -90,7 +90,7 @@ std::vector<model::Pose> toJoints(Checks& checks, const Path& path,
   checks.count(path, static_cast<std::size_t>(message.size()), jointCount, jointCount);
   std::vector<model::Pose> poses;
   for (int i = 0; i < message.size() && !checks.failed(); ++i)
-    poses.push_back(toExactPose(checks, path, message[i]));
+    poses.push_back(toExactPose(checks, path.at("", i), message[i]));
   return poses;
 }
 

@@ -10,6 +10,9 @@
 
 #include <fmt/format.h>
 
+#include "proto/text/excerpt.h"
+#include "proto/text/printable.h"
+#include "proto/text/utf8.h"
 #include "server/messages/limits.h"
 #include "server/messages/skin_message.h"
 #include "server/model/distance_grid.h"
@@ -94,19 +97,35 @@ void place(Checks& checks, const Path& path, float scale, std::vector<model::Vec
 
 // Gives the skin of a file the names, the scale and the vertices of the mesh, and checks that the joints are
 // in the world.
-std::optional<model::Skin> ofFile(Checks& checks, const Path& path, float scale, model::Skin skin,
-                                  std::span<const std::uint32_t> sources) {
-  const auto place = [&](model::Pose& pose) {
+std::optional<model::Skin> ofFile(Checks& checks, const Path& path, const std::string& file, float scale,
+                                  model::Skin skin, std::span<const std::uint32_t> sources) {
+  const auto most = static_cast<float>(limits::kPosition.max);
+  const auto place = [&](model::Pose& pose, std::size_t joint, const auto& when) {
     pose.position *= scale;
-    for (int axis = 0; axis < 3; ++axis) checks.number(path, pose.position[axis], limits::kPosition);
+    const float far = pose.position.cwiseAbs().maxCoeff();
+    if (!(far <= most))
+      checks.failNamed(path, file,
+                       fmt::format("has the joint \"{}\" {:g} m from its parent, along one axis, {}; must be "
+                                   "within {:g} m: move it, or set \"scale\"",
+                                   excerpt(skin.joints[joint].name), far, when(), most));
   };
-  for (model::Joint& joint : skin.joints) {
-    joint.name = checks.text(path, joint.name);
-    place(joint.rest);
+  for (std::size_t i = 0; i < skin.joints.size(); ++i) {
+    const std::string& name = skin.joints[i].name;
+    if (name.size() > limits::kMaxTextBytes || !isUtf8(name) || hasControlCharacters(name))
+      checks.failNamed(
+          path, file,
+          fmt::format("has the joint {} with the name \"{}\"; must be one line of at most {} bytes "
+                      "of UTF-8 without control characters",
+                      i, excerpt(name), limits::kMaxTextBytes));
+    place(skin.joints[i].rest, i, [] { return std::string("where the skin binds it"); });
   }
   for (model::JointKey& key : skin.keys) {
-    checks.number(path, key.time, limits::kMotionTime);
-    for (model::Pose& pose : key.joints) place(pose);
+    if (!(key.time <= static_cast<float>(limits::kMotionTime.max)))
+      checks.failNamed(path, file,
+                       fmt::format("has an animation of {:g} s; must be at most {:g} s: export a shorter one",
+                                   key.time, limits::kMotionTime.max));
+    for (std::size_t i = 0; i < key.joints.size(); ++i)
+      place(key.joints[i], i, [&] { return fmt::format("{:g} s after the animation begins", key.time); });
   }
   std::vector<model::VertexJoints> vertices;
   for (const std::uint32_t source : sources) vertices.push_back(skin.vertices[source]);
@@ -165,7 +184,7 @@ model::Solid toSolid(Checks& checks, const Path& path, const v1::ColliderMesh& m
   if (message.has_skin())
     mesh.skin = toSkin(checks, path / "skin", message.skin(), vertexCount, mesh.sources);
   else if (surface.skin)
-    mesh.skin = ofFile(checks, path / "file", scale, std::move(*surface.skin), mesh.sources);
+    mesh.skin = ofFile(checks, path / "file", message.file(), scale, std::move(*surface.skin), mesh.sources);
   if (message.has_distance_cell())
     mesh.distanceCell = toDistanceCell(checks, path / "distanceCell", message.distance_cell(), mesh);
   if (checks.failed()) return nullptr;

@@ -58,11 +58,10 @@ Result<void> appendTo(SurfaceParts& parts, const v1::SurfacePart& message) {
       parts.vertices.size() + vertices > 3 * model::kMaxSurfaceTriangles)
     return tl::unexpected(FieldError{
         v1::ERROR_CODE_RESOURCE_EXHAUSTED,
-        fmt::format(
-            "surface.part: {} triangles and {} vertices until now are too many: a surface has at most {} "
-            "and {}; send several surfaces, or fewer triangles",
-            parts.triangles.size() + triangles, parts.vertices.size() + vertices, model::kMaxSurfaceTriangles,
-            3 * model::kMaxSurfaceTriangles),
+        fmt::format("{} triangles and {} vertices until now are too many: a surface has at most {} "
+                    "and {}; send several surfaces, or fewer triangles",
+                    parts.triangles.size() + triangles, parts.vertices.size() + vertices,
+                    model::kMaxSurfaceTriangles, 3 * model::kMaxSurfaceTriangles),
         telemetry::Refusal::colliders});
   for (int i = 0; i + 2 < message.positions_size(); i += 3)
     parts.vertices.emplace_back(message.positions(i), message.positions(i + 1), message.positions(i + 2));

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "proto/text/excerpt.h"
 #include "proto/text/printable.h"
 #include "proto/text/utf8.h"
 
@@ -15,6 +16,8 @@ namespace {
 
 // Maximum length of a value in an error text. An answer is then not larger than its request.
 constexpr std::size_t kMaxShown = 80;
+// The same of values that may be paths of files.
+constexpr std::size_t kMaxValue = 1024;
 
 std::string inQuotes(std::string_view value) {
   std::string shown = "\"";
@@ -98,7 +101,7 @@ void Checks::failSize(const Path& path, std::string_view allowed, std::string_vi
 void Checks::fail(const Path& path, std::string_view value, std::string_view allowed, v1::ErrorCode code) {
   if (error_) return;
   std::string where = path.text();
-  if (!value.empty()) where += fmt::format("{}= {}", where.empty() ? "" : " ", value);
+  if (!value.empty()) where += fmt::format("{}= {}", where.empty() ? "" : " ", excerpt(value, kMaxValue));
   error_ = FieldError{code, where.empty() ? std::string(allowed) : fmt::format("{}: {}", where, allowed)};
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <cmath>
 
 #include "server/model/distance_grid.h"
 #include "server/model/gas.h"
@@ -38,17 +39,23 @@ constexpr double kCoarseNode = 1, kCoarseLink = 1.4, kCoarseLinks = 4;
 // kFewAround that lies in one place (ClosedMesh::crowding), at most kMostSearch, as the device limits it
 // (kMostSolidVisits). Distances that are sampled cost it kGridWork.
 constexpr double kSearch = 6, kFewAround = 16, kCrowdedSearch = 1.2, kMostSearch = 4096, kGridWork = 3;
-// A search in a surface of the real room tests each triangle kSurfaceTests times. A third of the nodes are
-// near.
-constexpr double kSurfaceTests = 3, kNearSurface = 1.0 / 3;
+// Surfaces of the real room cost each node kSurfaceNode. Of a third of the nodes, which lie on one, the paths
+// are searched kSurfaceTests times in a substep. A search visits the way down a tree: the binary logarithm of
+// its triangles, but at least kLeastSurfaceSearch.
+//
+// All 4,096 nodes of a sheet on floors of 900, 10,000, 50,000 and 100,000 triangles, in two surfaces, add 25
+// to 29, 32 to 39, 46 to 48 and 52 to 58 node-steps (clothstream-bench garment, smallest times of two runs on
+// two cores of lavapipe, 30 November 2026), of which 7 are there next to all surfaces. A third of the nodes
+// is then 13 to 24, and the price 15 to 22.
+constexpr double kSurfaceNode = 6, kSurfaceTests = 3, kNearSurface = 1.0 / 3, kLeastSurfaceSearch = 4;
 // Each vertex costs kSkinVertex, and each triangle kRefitTriangle, in a tick of a solid that joints move.
 constexpr double kStrides = 10;  // searches of a path near a body that joints move fast, instead of one
 constexpr double kSkinVertex = 20, kRefitTriangle = 5, kSkinDispatches = 4;
-// Each node of a cloth that follows joints costs kClothSkinTick in a tick, for its places at both ends, like
-// a vertex of a solid that joints move, and for its normals there. It costs kClothSkinStep in a substep,
-// where it is kept near its place. Its joints, limits, and places and normals at both ends take
-// kClothSkinBytes.
-constexpr double kClothSkinTick = 30, kClothSkinStep = 0.5, kClothSkinBytes = 128;
+// Each node of a cloth that follows joints costs kClothSkinTick in a tick, for its place and normal, and
+// kClothSkinStep in a substep, where it is kept near its place. Its joints, limits, and places and normals at
+// both ends take kClothSkinBytes. Measured: 1 to 2 in a tick (stage "attachments" of the scene `dress`), and
+// 1.1 to 1.5 in each of ten substeps, the tick included (clothstream-bench garment, as above).
+constexpr double kClothSkinTick = 2, kClothSkinStep = 1.1, kClothSkinBytes = 128;
 constexpr double kClothSkinDispatches = 4;
 // Each node costs these in a tick and in a frame. The frame includes entropy coding on the host.
 constexpr double kTick = 2, kFrame = 8;
@@ -138,7 +145,9 @@ double searchWork(const ClosedMesh& mesh) {
 }
 
 double surfaceWork(const Surface& surface) {
-  const double search = kSearch + kCrowdedSearch * std::max(surface.crowding - kFewAround, 0.0);
+  const double depth = std::log2(static_cast<double>(surface.triangles.size()));
+  const double search =
+      std::max(depth, kLeastSurfaceSearch) + kCrowdedSearch * std::max(surface.crowding - kFewAround, 0.0);
   return kNearSurface * std::min(kSurfaceTests * search, kMostSearch);
 }
 
@@ -291,7 +300,7 @@ Work PriceModel::surfacesWork(const Scene& scene, double searches) const {
   double nodes = 0;
   for (const ClothCounts& counts : cloths_) nodes += static_cast<double>(counts.nodes);
   Work work;
-  work.nodeSteps = searches * nodes * scene.substeps;
+  work.nodeSteps = (kSurfaceNode + searches) * nodes * scene.substeps;
   work.dispatches = scene.substeps;
   return work;
 }

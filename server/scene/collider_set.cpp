@@ -11,6 +11,7 @@
 #include "server/messages/description.h"
 #include "server/messages/skin_message.h"
 #include "server/model/jump.h"
+#include "server/model/same_pose.h"
 #include "server/scene/hand_limits.h"
 
 namespace clothstream::scene {
@@ -19,10 +20,6 @@ namespace {
 const model::Skin* skinOf(const model::Collider& collider) {
   const auto* solid = std::get_if<model::Solid>(&collider.shape);
   return solid != nullptr && (*solid)->skin ? &*(*solid)->skin : nullptr;
-}
-
-bool isSame(const model::Pose& a, const model::Pose& b) {
-  return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs();
 }
 
 }  // namespace
@@ -99,8 +96,8 @@ void ColliderSet::takeAlong(const model::Skin& skin, std::size_t index,
   collider.before = kept_.colliders[index];
   model::compose(skin, kept_.joints[index], collider.jointsBefore);
   // A cloth that is where it was is not even rounded.
-  collider.jumped = !isSame(collider.before, collider.start) ||
-                    !std::ranges::equal(collider.jointsBefore, collider.jointsStart, isSame);
+  collider.jumped = !model::isSame(collider.before, collider.start) ||
+                    !std::ranges::equal(collider.jointsBefore, collider.jointsStart, model::isSame);
 }
 
 // Elements keep the memory of their joints.

@@ -187,7 +187,7 @@ messages::Result<void> PricedDefinition::chargeWinds(std::size_t count) {
 
 messages::Result<void> PricedDefinition::chargeSurfaces(const SurfaceLoad& load) {
   const std::lock_guard lock(mutex_);
-  auto charged = charge_.chargeSurfaces("surface", definition_.accepted(), load);
+  auto charged = charge_.chargeSurfaces("", definition_.accepted(), load);
   comparePrice();
   return charged;
 }

@@ -187,6 +187,7 @@ messages::Result<void> RoomSurfaces::put(const Ticket& ticket, simulation::Share
     entry->placed = std::move(former);
     static_cast<void>(charge());  // as before
     forgetNext(*owner, ticket.id);
+    charged.error().text = fmt::format("surface.id = {}: {}", ticket.id, charged.error().text);
     return charged;
   }
   entry->nextPose.reset();

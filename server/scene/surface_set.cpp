@@ -4,16 +4,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/model/same_pose.h"
 #include "server/simulation/collision/surface_stage.h"
 
 namespace clothstream::scene {
-namespace {
-
-bool hasMoved(const model::Pose& from, const model::Pose& to) {
-  return from.position != to.position || from.orientation.coeffs() != to.orientation.coeffs();
-}
-
-}  // namespace
 
 void SurfaceSet::set(std::span<const RoomSurface> surfaces) {
   std::swap(slots_, former_);
@@ -28,7 +22,7 @@ void SurfaceSet::set(std::span<const RoomSurface> surfaces) {
       slot.liftTicks = before->liftTicks;
     }
     if (slot.acting && slot.acting->table == surface.placed.table) {
-      if (hasMoved(slot.acting->pose, surface.placed.pose)) slot.liftTicks = kLiftTicks;
+      if (!model::isSame(slot.acting->pose, surface.placed.pose)) slot.liftTicks = kLiftTicks;
       slot.acting = surface.placed;
     } else {
       slot.next = surface.placed;

@@ -27,6 +27,10 @@ using scene::Action;
 // Largest answer in a stream; it bounds the memory that a peer costs. Scenes with large meshes need the unary
 // call.
 constexpr std::size_t kMaxAnswerBytes = 1024 * 1024;
+// One thread makes the surfaces of all participants, and needs 1 to 2 us for a triangle. Each number of
+// triangles costs a token in addition to that of the message, so that one participant takes at most a quarter
+// of the thread. A mesh of 50,000 triangles may be sent twice a second.
+constexpr double kSurfaceTrianglesOfToken = 750;
 
 }  // namespace
 
@@ -307,8 +311,11 @@ struct Session::Messages {
                                    "(--room-surfaces off)"});
     const auto update = messages::toSurfaceUpdate(message.surface());
     if (!update) {
-      session.surfaceUpload_.drop(scene.surfaces, message.surface().id());
-      return session.refuse(update.error());
+      const std::uint32_t id = message.surface().id();
+      session.surfaceUpload_.drop(scene.surfaces, id);
+      return session.refuse({update.error().code,
+                             fmt::format("{} (surface.id = {})", update.error().text, id),
+                             update.error().limit});
     }
     if (update->keep) {
       session.surfaceUpload_.dropOthers(scene.surfaces, *update->keep);
@@ -434,6 +441,16 @@ void Session::dispatch(const v1::ClientMessage& message) {
 
 messages::Result<void> Session::surfacePart(const messages::SurfaceUpdate& update,
                                             const v1::SurfacePart& message) {
+  if (!bucket(Rate::surfaces).take(sent_, message.triangles_size() / 3 / kSurfaceTrianglesOfToken)) {
+    surfaceUpload_.drop(scene_->surfaces, update.id);
+    return tl::unexpected(messages::FieldError{
+        v1::ERROR_CODE_RATE_LIMITED,
+        fmt::format(
+            "surface.id = {}: too many triangles in a short time, so that this mesh was dropped; send "
+            "meshes that change at most twice a second, and only what has changed",
+            update.id),
+        telemetry::Refusal::messageRate});
+  }
   if (update.part->index == 0) {
     const auto ticket = scene_->surfaces.begin(participant_, update.id, update.pose.value_or(model::Pose{}),
                                                server_.options.participantsMay);

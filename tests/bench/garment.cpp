@@ -144,6 +144,7 @@ void runGarment(vulkan::Device& device, const Settings& settings, const RowSink&
       addSheets(device, settings, add, size, solver);
   addSurfaces(device, settings, add);
   addFigures(device, settings, add);
+  addPrices(device, settings, add);
 }
 
 }  // namespace clothstream::bench

@@ -234,6 +234,9 @@ TEST(GltfSkin, RefusesWhatIsNotSupportedWithTheReason) {
                 sampler(g, 0)["input"] = g.add({0, 1}, "SCALAR");
               }),
               HasSubstr("has 3 values for 2 keys"));
+  EXPECT_THAT(
+      errorOf([&](G& g) { g.root["accessors"][sampler(g, 0)["input"].get<std::size_t>()]["count"] = 0; }),
+      HasSubstr("has no elements"));
   EXPECT_THAT(errorOf([&](G& g) { sampler(g, 0)["output"] = g.add(std::vector<float>(12, 0), "VEC4"); }),
               HasSubstr("quaternions of length 1"));
   EXPECT_THAT(errorOf([](G&) {}, {.animation = {}, .joints = 128, .keys = 2, .poses = 16'384}),
@@ -246,6 +249,15 @@ TEST(GltfSkin, RefusesWhatIsNotSupportedWithTheReason) {
                 g.root["nodes"][kLower]["scale"] = {1, 2, 1};
               }),
               HasSubstr("node 1 is mirrored, or scaled differently along its axes"));
+  EXPECT_THAT(errorOf([](G& g) {
+                g.root["nodes"][kLower]["rotation"] = {0, 0, 0, 0};
+              }),
+              HasSubstr("node 1 has a rotation of length 0"));
+  EXPECT_THAT(errorOf([](G& g) {
+                g.root["skins"][0].erase("name");
+                g.root["skins"][0]["joints"] = json::array();
+              }),
+              HasSubstr("skin 0: has 0 joints"));
   EXPECT_THAT(errorOf([](G& g) {
                 g.root["nodes"][kUpper]["scale"] = {2, 2, 2};
               }),
@@ -271,13 +283,20 @@ TEST(GltfSkin, RefusesWhatIsNotSupportedWithTheReason) {
   EXPECT_THAT(errorOf([](G& g) { g.root["nodes"][3]["skin"] = 5; }), HasSubstr("skin 5 does not exist"));
   EXPECT_THAT(errorOf([&](G& g) { attributes(g)["JOINTS_1"] = attributes(g)["JOINTS_0"]; }),
               HasSubstr("has a skin, but no WEIGHTS_1"));
+  EXPECT_THAT(errorOf([&](G& g) { attributes(g)["WEIGHTS_1"] = attributes(g)["WEIGHTS_0"]; }),
+              HasSubstr("has a skin, but no JOINTS_1"));
+  EXPECT_THAT(errorOf([&](G& g) {
+                attributes(g).erase("WEIGHTS_0");
+                g.root["meshes"][0].erase("name");
+              }),
+              HasSubstr("mesh 0, primitive 0: has a skin, but no WEIGHTS_0"));
   EXPECT_THAT(errorOf([&](G& g) { attributes(g).erase("WEIGHTS_0"); }),
               HasSubstr("mesh \"rod\", primitive 0: has a skin, but no WEIGHTS_0"));
   EXPECT_THAT(
       errorOf([&](G& g) { attributes(g)["WEIGHTS_0"] = g.add(std::vector<float>(8, 0.25f), "VEC4"); }),
       HasSubstr("has 2 elements of WEIGHTS_0 for 106 vertices"));
   EXPECT_THAT(errorOf([&](G& g) { attributes(g)["WEIGHTS_0"] = g.add(std::vector<float>(424, 0), "VEC4"); }),
-              HasSubstr("vertex 0 has no weight"));
+              HasSubstr("vertex 0 has no weight; its weights must add up to 1"));
   EXPECT_THAT(errorOf([&](G& g) { attributes(g)["WEIGHTS_0"] = g.add(std::vector<float>(424, -1), "VEC4"); }),
               HasSubstr("vertex 0 has the weight -1; must be 0 to 1"));
   EXPECT_THAT(errorOf([&](G& g) { g.root["skins"][0]["joints"] = {kUpper}; }),

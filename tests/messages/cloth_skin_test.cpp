@@ -21,6 +21,7 @@ namespace clothstream::messages {
 namespace {
 
 using model::SkinLimits;
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -433,6 +434,24 @@ TEST(ClothSkin, IsRefusedForWrongLimits) {
          at(s).set_backstop_radius(-1);
        }},
   });
+}
+
+// The sheet is at z = 0.5.
+TEST(ClothSkin, IsRefusedForARegionWithoutNodes) {
+  const auto add = [](v1::Scene& scene, float z) {
+    v1::SkinRegion& region = *skin(scene).add_regions();
+    region.mutable_region()->mutable_centre()->set_z(z);
+    region.mutable_region()->set_radius(1);
+    region.mutable_limits()->set_max_distance(0);
+  };
+  v1::Scene message = dressedScene();
+  add(message, 1);
+  EXPECT_TRUE(toScene(message));
+  add(message, -2);
+  EXPECT_THAT(
+      toScene(message).error().text,
+      AllOf(StartsWith("cloths[0].skin.regions[1].region: contains no node of the cloth, which is between"),
+            HasSubstr(" 0.5) and ("), HasSubstr(" 0.5) at rest")));
 }
 
 TEST(ClothSkin, IsRefusedForNodesThatTwoThingsMove) {

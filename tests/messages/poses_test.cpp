@@ -9,11 +9,13 @@
 #include <gtest/gtest.h>
 
 #include "server/messages/client_message.h"
+#include "server/messages/scene_file.h"
 #include "tests/messages/scenes.h"
 
 namespace clothstream::messages {
 namespace {
 
+using testing::HasSubstr;
 using testing::StartsWith;
 
 v1::ColliderPoses poses(std::uint32_t count) {
@@ -41,17 +43,58 @@ Result<std::vector<model::ParticipantCollider>> collidersOf(const v1::ColliderPo
   return toPoses(message, sceneWithAttachments()).map([](const auto& poses) { return poses.colliders; });
 }
 
-TEST(ToPoses, RefusesAttachmentsOutsideOfTheRangeOfTheStream) {
+// The stream holds 514.2 m. Cloth that hangs from an attachment needs room, too.
+TEST(ToPoses, RefusesAttachmentsBeyondHalfOfTheRangeOfTheStream) {
   v1::ColliderPoses message;
   message.add_attachments()->set_name("knot");
   v1::Vec3& position = *message.mutable_attachments(0)->mutable_pose()->mutable_position();
-  position.set_y(-514);
+  position.set_y(-257);
   EXPECT_TRUE(toPoses(message, sceneWithAttachments()));
-  position.set_y(-515);
+  position.set_y(-258);
   const auto poses = toPoses(message, sceneWithAttachments());
   ASSERT_FALSE(poses);
-  EXPECT_THAT(poses.error().text,
-              testing::HasSubstr("attachments[0].pose = -515: must be a finite number from -514"));
+  EXPECT_THAT(poses.error().text, HasSubstr("attachments[0].pose = -258: must be a finite number from -257"));
+}
+
+// The dress of this scene follows the joints of "avatar", and would take the scene back for everyone if it
+// left the 514.2 m of the stream. Nothing follows "floor".
+TEST(ToPoses, KeepsClothThatFollowsABodyInTheRangeOfTheStreamByPlaceAndJointsTogether) {
+  const model::Scene scene = *loadScene("dress");
+  const auto stands = [&](float x) {
+    v1::WearBody message;
+    message.set_collider("avatar");
+    message.mutable_stands()->mutable_position()->set_x(x);
+    const auto worn = toWornBody(message, scene);
+    return worn ? "no error" : worn.error().text;
+  };
+  EXPECT_EQ(stands(257), "no error");
+  EXPECT_THAT(stands(258), StartsWith("wearBody.stands = 258: must be a finite number from -257"));
+  EXPECT_THAT(stands(kNan), StartsWith("wearBody.stands.position.x = nan:"));
+  const auto moved = [&](const char* collider, float x) {
+    v1::ParameterChange message;
+    v1::ColliderChange& change = *message.add_colliders();
+    change.set_name(collider);
+    change.mutable_position()->set_x(x);
+    const auto changed = toParameterChange(message, scene, model::StabilityBound(scene));
+    return changed ? "no error" : changed.error().text;
+  };
+  EXPECT_EQ(moved("avatar", -257), "no error");
+  EXPECT_THAT(moved("avatar", -258),
+              StartsWith("parameterChange.colliders[0].position = -258: must be a finite number from -257"));
+  EXPECT_EQ(moved("floor", 900), "no error");
+  const auto joints = [&](float x) {
+    v1::ColliderPoses message;
+    v1::ColliderJoints& poses = *message.add_joints();
+    poses.set_collider("avatar");
+    for (int i = 0; i < 17; ++i) poses.add_joints();
+    poses.mutable_joints(0)->mutable_position()->set_x(x);
+    const auto read = toPoses(message, scene);
+    return read ? "no error" : read.error().text;
+  };
+  // The dress is 1 m high, and 1 m wide.
+  EXPECT_EQ(joints(250), "no error");
+  EXPECT_THAT(joints(257), HasSubstr("joints: take the cloth \"dress\" up to 25"));
+  EXPECT_THAT(joints(kNan), StartsWith("colliderPoses.joints[0].joints[0].position.x = nan:"));
 }
 
 TEST(ToPoses, ReturnsGrabsWithDefaultsAndAttachmentsByIndex) {

@@ -218,6 +218,31 @@ TEST_F(AvatarFile, IsRefusedWithTheFieldAndTheReason) {
   EXPECT_THAT(errorOf(), StartsWith("colliders[0].mesh.animation = \"bend\": is an animation of a file"));
 }
 
+TEST_F(AvatarFile, IsRefusedForNumbersOutOfTheWorldWithTheJointOrTheTime) {
+  const auto errorOf = [&](const std::function<void(meshes::SkinnedGlb&)>& spoil) {
+    meshes::SkinnedGlb glb;
+    spoil(glb);
+    std::ofstream(path_, std::ios::binary) << glb.bytes();
+    const Result<model::Scene> made = scene();
+    return made ? std::string("no error") : made.error().text;
+  };
+  using G = meshes::SkinnedGlb;
+  EXPECT_EQ(
+      errorOf([](G& g) {
+        g.root["animations"][0]["samplers"][0]["input"] = g.add({0, 1, 1e30f}, "SCALAR");
+      }),
+      "colliders[0].mesh.file = \"rod.glb\": has an animation of 1e+30 s; must be at most 86400 s: export a "
+      "shorter one");
+  EXPECT_THAT(
+      errorOf([](G& g) {
+        g.root["nodes"][meshes::kUpper]["translation"] = {1e7, 0, 0};
+      }),
+      StartsWith("colliders[0].mesh.file = \"rod.glb\": has the joint \"upper\" 100000 m from its parent, "
+                 "along one axis, 0 s after the animation begins; must be within 1000 m"));
+  EXPECT_THAT(errorOf([](G& g) { g.root["nodes"][meshes::kUpper]["name"] = "a\x1b"; }),
+              StartsWith("colliders[0].mesh.file = \"rod.glb\": has the joint 1 with the name \"a\\x1B\""));
+}
+
 TEST(SolidMessage, PosesOfJointsAreOfAColliderThatHasThem) {
   const model::Scene scene = *toScene(sceneWithMesh());
   v1::ColliderPoses message;

@@ -2,11 +2,14 @@
 // Price of a scene, without a device.
 #include "server/model/price.h"
 
+#include <utility>
+
 #include <gtest/gtest.h>
 
 #include "server/model/cloth_skin.h"
 #include "tests/model/meshes.h"
 #include "tests/model/solids.h"
+#include "tests/model/surfaces.h"
 
 namespace clothstream::model {
 namespace {
@@ -65,6 +68,23 @@ TEST(Price, AClothThatFollowsJointsCostsMoreTimeAndMemory) {
   EXPECT_GT(secondsOf(bound), 1.5 * secondsOf(free));
   EXPECT_LT(secondsOf(bound), 4 * secondsOf(free));
   EXPECT_EQ(PriceModel(bound).bytes(bound) - PriceModel(free).bytes(free), 128.0 * 100 * 100);
+}
+
+// A floor in two surfaces, as clothstream-bench garment measures it: what all nodes of a sheet on it add, in
+// node-steps, and what nodes next to it add.
+TEST(Price, SurfacesAreWithinAFactorOfOneAndAHalfOfAMeasurement) {
+  const Scene scene = sheetScene(64);
+  const PriceModel prices(scene);
+  constexpr double kBeside = 7;
+  for (const auto& [cells, onIt] : {std::pair(15u, 27.0), {50u, 36.0}, {111u, 47.0}, {158u, 55.0}}) {
+    const Surface half = surfaceOf(flat(2, 4, cells));
+    const double priced = prices.surfacesWork(scene, 2 * kSurfaceTestWork + surfaceWork(half)).nodeSteps /
+                          (4096.0 * scene.substeps);
+    const double measured = kBeside + (onIt - kBeside) / 3;
+    EXPECT_LT(priced, 1.5 * measured) << cells;
+    EXPECT_GT(priced, measured / 1.5) << cells;
+  }
+  EXPECT_EQ(prices.surfacesWork(scene, 0).nodeSteps, 0);
 }
 
 // A GPU sweeps cloths of 33 to 64 nodes a side with all of its workgroups (XpbdStage, SolveStage).

@@ -72,6 +72,16 @@ TEST_F(XrLimb, ControllerHasPriorityAndSwitchesBothWaysAtOnce) {
   EXPECT_TRUE(limb.isNew());
 }
 
+TEST_F(XrLimb, PressAfterASwitchIsNew) {
+  giveHand(sample, {0, 1, 0}, kClosed);
+  update();
+  giveController(sample, {1, 1, 0});
+  sample.trigger = 1;
+  update();
+  EXPECT_TRUE(limb.pressed());
+  EXPECT_TRUE(limb.isNew());
+}
+
 TEST_F(XrLimb, ImpossibleJointsCountAsLost) {
   giveHand(sample, {0, 1, 0}, kOpen);
   sample.joints[3].position.x() = std::numeric_limits<float>::quiet_NaN();

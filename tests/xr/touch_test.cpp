@@ -69,6 +69,17 @@ TEST_F(XrTouch, ControllersAreSpheresAndHandsAreJoints) {
   EXPECT_FLOAT_EQ(input.hands[indexOf(Side::left)][3], 0.008f);
 }
 
+TEST_F(XrTouch, ControllerDoesNotHoldWhatTheHandHeld) {
+  giveHand(right(), {0.1f, 1, 0.05f}, 0.01f);
+  frame();
+  ASSERT_TRUE(touch.grabber(Side::right).holds());
+  giveController(right(), {0.1f, 1, 2});
+  right().squeeze = 1;
+  frame();
+  EXPECT_TRUE(touch.limb(Side::right).pressed());
+  EXPECT_FALSE(touch.grabber(Side::right).holds());
+}
+
 TEST_F(XrTouch, SqueezeNamesSeenPlaceAndTurnsWithController) {
   giveController(right(), {0.1f, 1, 0.05f});
   right().squeeze = 1;

@@ -6,21 +6,22 @@
 
 #include <spdlog/spdlog.h>
 
+#include "proto/text/printable.h"
+
 namespace clothstream::xr {
 namespace {
 
-// Called by the threads of libclothstream. Attempts to reconnect repeat themselves ten times a second.
+// Called by the threads of libclothstream. Attempts to reconnect repeat themselves ten times a second. Why a
+// stream has ended is logged by Connection.
 void logLine(void*, std::uint32_t level, const char* text) {
   static std::mutex mutex;
   static std::string last;
   const std::string_view line = text;
   const std::lock_guard lock(mutex);
-  if (line == last || line.starts_with("reconnecting in")) return spdlog::debug("{}", line);
+  if (line == last || line.starts_with("reconnecting in") || level == CLOTHSTREAM_LOG_ERROR)
+    return spdlog::debug("{}", line);
   last = line;
-  spdlog::log(level == CLOTHSTREAM_LOG_ERROR     ? spdlog::level::err
-              : level == CLOTHSTREAM_LOG_WARNING ? spdlog::level::warn
-                                                 : spdlog::level::info,
-              "{}", text);
+  spdlog::log(level == CLOTHSTREAM_LOG_WARNING ? spdlog::level::warn : spdlog::level::info, "{}", line);
 }
 
 clothstream_options libraryOptions(const ConnectionOptions& options) {
@@ -118,6 +119,7 @@ void Connection::take(Attempt attempt, std::uint64_t nowUs, std::uint32_t& event
   }
   if (attempt.result != CLOTHSTREAM_OK) return fail(attempt.step, attempt.result, attempt.error, nowUs);
   close(std::exchange(stream_, attempt.stream));
+  joined_ = options_;
   ++clientNumber_;
   ended_ = false;
   failures_ = 0;
@@ -154,15 +156,36 @@ void Connection::follow(std::uint64_t nowUs, std::uint32_t& events) {
 }
 
 void Connection::fail(Step step, clothstream_result result, const std::string& text, std::uint64_t nowUs) {
-  const bool retries = retriesByItself(step, result);
+  Trouble trouble = troubleOf(step, result, text);
+  if (stream_ && !ended_) {
+    // The user stays where they are; follow() finds the phase.
+    options_ = joined_;
+    notice_ = trouble.title + ": " + text;
+    return spdlog::warn("{}", printable(notice_));
+  }
+  isInvalid_ = result == CLOTHSTREAM_INVALID;
   retryUs_ = nowUs + retryDelayUs(++failures_);
-  show(retries ? Phase::waiting : Phase::refused, troubleOf(step, result, text, options_.address));
+  show(retriesByItself(result) ? Phase::waiting : Phase::refused, std::move(trouble));
+}
+
+bool Connection::leave() {
+  std::optional<Attempt> finished;
+  {
+    const std::lock_guard lock(mutex_);
+    finished.swap(finished_);
+  }
+  if (finished) {
+    isOpening_ = false;
+    clothstream_close(finished->stream);
+  }
+  clothstream_close(std::exchange(stream_, nullptr));
+  return isOpening_;
 }
 
 void Connection::show(Phase phase, Trouble trouble) {
   if (!(trouble == trouble_)) {
     if (!trouble.title.empty()) {
-      spdlog::warn("{}: {}", trouble.title, trouble.advice);
+      spdlog::warn("{}: {}", printable(trouble.title), printable(trouble.advice));
     } else {
       spdlog::info("The connection to {} is back", options_.address);
     }

@@ -67,6 +67,16 @@ class Connection {
   // Number of clients so far. Changes when acquire() gives another one.
   std::uint64_t clientNumber() const { return clientNumber_; }
 
+  // Reason why the user stays where they are although they have chosen another scene or quality; "" if
+  // nothing was refused since the last call.
+  std::string takeNotice() { return std::exchange(notice_, {}); }
+  // Whether the options are not allowed, so that no attempt can succeed.
+  bool isInvalid() const { return isInvalid_; }
+
+  // Leaves the scene, at the end of the program. Returns whether the second thread still waits for the
+  // network, for at most joinTimeoutMs.
+  bool leave();
+
   Phase phase() const { return phase_; }
   const Trouble& trouble() const { return trouble_; }
   const ConnectionOptions& options() const { return options_; }
@@ -96,10 +106,13 @@ class Connection {
   static void run(Attempt& attempt);
 
   ConnectionOptions options_;
+  ConnectionOptions joined_;  // of the stream
   clothstream_stream* stream_ = nullptr;
   std::uint64_t clientNumber_ = 0;
   Phase phase_ = Phase::connecting;
   Trouble trouble_;
+  std::string notice_;
+  bool isInvalid_ = false;
   std::uint32_t failures_ = 0;
   std::uint64_t retryUs_ = 0;
   bool ended_ = false;      // the stream has ended, but is still read

@@ -25,13 +25,13 @@ struct Trouble {
   bool operator==(const Trouble&) const = default;
 };
 
-// Says what a result means for the user. `text` is the error of the library, `address` that of the server.
-Trouble troubleOf(Step step, clothstream_result result, const std::string& text, const std::string& address);
+// Says what a result means for the user. `text` is the error of the library.
+Trouble troubleOf(Step step, clothstream_result result, const std::string& text);
 // Says that the connection is lost and is being opened again.
 Trouble lostTrouble(const std::string& address);
 
 // Whether another attempt can succeed without a change of the options.
-bool retriesByItself(Step step, clothstream_result result);
+bool retriesByItself(clothstream_result result);
 
 // Time before the next attempt: 1 s after the first failure, then twice as long each time, at most 8 s.
 std::uint64_t retryDelayUs(std::uint32_t failures);

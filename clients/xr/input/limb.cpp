@@ -27,6 +27,7 @@ float pinchStrength(const HandJoints& joints) {
 }  // namespace
 
 void Limb::update(const LimbSample& sample, const Pose* head, const Pose& toScene, std::uint64_t nowUs) {
+  const LimbKind before = kind_;
   const bool wasPressed = pressed();
   isNew_ = false;
   seen_ = readController(sample, toScene) || readHand(sample, toScene);
@@ -37,7 +38,7 @@ void Limb::update(const LimbSample& sample, const Pose* head, const Pose& toScen
   }
   if (!present()) return;
   if (seen_) aim(sample, head, toScene);
-  isNew_ = pressed() && !wasPressed;
+  isNew_ = pressed() && (!wasPressed || kind_ != before);
 }
 
 void Limb::forget() {

@@ -45,7 +45,7 @@ class Limb {
   const HandJoints& joints() const { return joints_; }
 
   // Pressed: the hand pinches, or trigger or squeeze of the controller are down. `isNew` in the frame in
-  // which the press began.
+  // which the press began; the press of another kind is a new one.
   bool pressed() const { return pinch_.pressed() || trigger_.pressed() || squeeze_.pressed(); }
   bool isNew() const { return isNew_; }
   // Whether the press points at something: a pinch or a trigger, not a squeeze.

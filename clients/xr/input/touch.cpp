@@ -8,7 +8,7 @@ void Touch::update(const InputSample& sample, const Pose& toScene, std::uint64_t
   if (hasHead_) head_ = toScene * sample.head;
   for (std::size_t i = 0; i < kSides; ++i) {
     limbs_[i].update(sample.limbs[i], hasHead_ ? &sample.head : nullptr, toScene, nowUs);
-    if (!limbs_[i].pressed()) grabbers_[i].release();
+    if (!limbs_[i].pressed() || limbs_[i].isNew()) grabbers_[i].release();
     used_[i] = false;
   }
 }

@@ -170,7 +170,8 @@ void Actions::read(XrSpace room, XrTime time, std::array<LimbSample, kSides>& li
     get.action = grip_;
     auto pose = typed<XrActionStatePose>(XR_TYPE_ACTION_STATE_POSE);
     check(xrGetActionStatePose(session_, &get, &pose), "xrGetActionStatePose");
-    // Hands have a profile with poses as well; they are read by their joints.
+    // Hands have a profile with poses as well; they are read by their joints. Without joints, a hand is a
+    // controller whose trigger is the pinch.
     if (pose.isActive == XR_TRUE && !isHandProfile_[side])
       limb.hasController = locate(gripSpaces_[side], room, time, limb.grip);
     get.action = aim_;
@@ -205,7 +206,7 @@ void Actions::profilesChanged() {
       check(
           xrPathToString(instance_.get(), state.interactionProfile, XR_MAX_PATH_LENGTH, &length, name.data()),
           "xrPathToString");
-    isHandProfile_[side] = std::strcmp(name.data(), kHandInteractionProfile) == 0;
+    isHandProfile_[side] = instance_.tracksHands() && std::strcmp(name.data(), kHandInteractionProfile) == 0;
     spdlog::info("{} uses {}", side == 0 ? "The left hand" : "The right hand",
                  length > 0 ? name.data() : "nothing");
   }

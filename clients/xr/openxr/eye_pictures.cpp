@@ -49,7 +49,7 @@ void changeLayout(VkCommandBuffer commands, VkImage image, std::uint32_t layers,
 
 EyePictures::EyePictures(const GraphicsDevice& device, const Swapchain::Shape& shape,
                          std::filesystem::path folder)
-    : device_(device), shape_(shape), folder_(std::move(folder)) {
+    : shape_(shape), folder_(std::move(folder)) {
   if (!std::filesystem::is_directory(folder_))
     throw std::runtime_error("--eye-pictures: " + folder_.string() + " is no folder; make it first");
   layerBytes_ = VkDeviceSize{4} * shape.size.width * shape.size.height;
@@ -57,23 +57,22 @@ EyePictures::EyePictures(const GraphicsDevice& device, const Swapchain::Shape& s
   info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
   info.size = layerBytes_ * shape.layers;
   info.usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
-  check(vkCreateBuffer(device.device, &info, nullptr, &buffer_), "vkCreateBuffer");
+  VkBuffer buffer = VK_NULL_HANDLE;
+  check(vkCreateBuffer(device.device, &info, nullptr, &buffer), "vkCreateBuffer");
+  buffer_ = {device.device, buffer, vkDestroyBuffer};
   VkMemoryRequirements needs;
-  vkGetBufferMemoryRequirements(device.device, buffer_, &needs);
+  vkGetBufferMemoryRequirements(device.device, buffer, &needs);
   VkMemoryAllocateInfo allocation{};
   allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
   allocation.allocationSize = needs.size;
   allocation.memoryTypeIndex = readableMemory(device.physical, needs.memoryTypeBits);
-  check(vkAllocateMemory(device.device, &allocation, nullptr, &memory_), "vkAllocateMemory");
-  check(vkBindBufferMemory(device.device, buffer_, memory_, 0), "vkBindBufferMemory");
+  VkDeviceMemory memory = VK_NULL_HANDLE;
+  check(vkAllocateMemory(device.device, &allocation, nullptr, &memory), "vkAllocateMemory");
+  memory_ = {device.device, memory, vkFreeMemory};
+  check(vkBindBufferMemory(device.device, buffer, memory, 0), "vkBindBufferMemory");
   void* mapped = nullptr;
-  check(vkMapMemory(device.device, memory_, 0, VK_WHOLE_SIZE, 0, &mapped), "vkMapMemory");
+  check(vkMapMemory(device.device, memory, 0, VK_WHOLE_SIZE, 0, &mapped), "vkMapMemory");
   mapped_ = static_cast<const std::uint8_t*>(mapped);
-}
-
-EyePictures::~EyePictures() {
-  vkDestroyBuffer(device_.device, buffer_, nullptr);
-  vkFreeMemory(device_.device, memory_, nullptr);
 }
 
 void EyePictures::record(VkCommandBuffer commands, VkImage image) {
@@ -81,7 +80,7 @@ void EyePictures::record(VkCommandBuffer commands, VkImage image) {
   VkBufferImageCopy copy{};
   copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, shape_.layers};
   copy.imageExtent = {shape_.size.width, shape_.size.height, 1};
-  vkCmdCopyImageToBuffer(commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, buffer_, 1, &copy);
+  vkCmdCopyImageToBuffer(commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, buffer_.get(), 1, &copy);
   changeLayout(commands, image, shape_.layers, false);
   VkMemoryBarrier barrier{};
   barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;

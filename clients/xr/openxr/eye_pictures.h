@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "clients/xr/openxr/swapchain.h"
-#include "clients/xr/render/device.h"
+#include "clients/xr/render/handle.h"
 
 namespace clothstream::xr {
 
@@ -14,9 +14,6 @@ class EyePictures {
  public:
   // Writes to an existing folder. `shape` is that of the swapchain, whose images can be read by transfers.
   EyePictures(const GraphicsDevice& device, const Swapchain::Shape& shape, std::filesystem::path folder);
-  ~EyePictures();
-  EyePictures(const EyePictures&) = delete;
-  EyePictures& operator=(const EyePictures&) = delete;
 
   // Records a copy of all layers. The image is in VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL before and
   // afterwards.
@@ -25,12 +22,11 @@ class EyePictures {
   void write(std::uint64_t number) const;
 
  private:
-  GraphicsDevice device_;
   Swapchain::Shape shape_;
   std::filesystem::path folder_;
   VkDeviceSize layerBytes_ = 0;
-  VkBuffer buffer_ = VK_NULL_HANDLE;
-  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  Owned<VkDeviceMemory> memory_;  // outlives the buffer
+  Owned<VkBuffer> buffer_;
   const std::uint8_t* mapped_ = nullptr;
 };
 

@@ -1,27 +1,32 @@
 // SPDX-License-Identifier: MIT
 #include "clients/xr/openxr/graphics.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 namespace clothstream::xr {
 
-Graphics::Graphics(const Instance& instance) {
+Graphics::Graphics(const Instance& instance, bool wantsDensity) {
   try {
-    choose(instance);
+    choose(instance, wantsDensity);
   } catch (...) {
-    if (device_.device) vkDestroyDevice(device_.device, nullptr);
-    if (device_.instance) vkDestroyInstance(device_.instance, nullptr);
+    release();
     throw;
   }
 }
 
 Graphics::~Graphics() {
   vkDeviceWaitIdle(device_.device);
-  vkDestroyDevice(device_.device, nullptr);
-  vkDestroyInstance(device_.instance, nullptr);
+  release();
 }
 
-void Graphics::choose(const Instance& instance) {
+void Graphics::release() {
+  if (device_.device) vkDestroyDevice(device_.device, nullptr);
+  loaded_.reset();
+  if (device_.instance) vkDestroyInstance(device_.instance, nullptr);
+}
+
+void Graphics::choose(const Instance& instance, bool wantsDensity) {
   auto needs = typed<XrGraphicsRequirementsVulkan2KHR>(XR_TYPE_GRAPHICS_REQUIREMENTS_VULKAN2_KHR);
   check(functionOf<PFN_xrGetVulkanGraphicsRequirements2KHR>(
             instance.get(), "xrGetVulkanGraphicsRequirements2KHR")(instance.get(), instance.system(), &needs),
@@ -29,7 +34,10 @@ void Graphics::choose(const Instance& instance) {
   constexpr XrVersion kOurs =
       XR_MAKE_VERSION(VK_API_VERSION_MAJOR(kVulkanVersion), VK_API_VERSION_MINOR(kVulkanVersion), 0);
   if (kOurs < needs.minApiVersionSupported)
-    throw std::runtime_error("The OpenXR runtime needs a newer version of Vulkan than this program uses");
+    throw std::runtime_error(fmt::format("The OpenXR runtime needs Vulkan {}.{}; this program uses {}.{}",
+                                         XR_VERSION_MAJOR(needs.minApiVersionSupported),
+                                         XR_VERSION_MINOR(needs.minApiVersionSupported),
+                                         XR_VERSION_MAJOR(kOurs), XR_VERSION_MINOR(kOurs)));
 
   const InstanceRequest instanceRequest({});
   auto instanceInfo = typed<XrVulkanInstanceCreateInfoKHR>(XR_TYPE_VULKAN_INSTANCE_CREATE_INFO_KHR);
@@ -41,7 +49,7 @@ void Graphics::choose(const Instance& instance) {
             instance.get(), &instanceInfo, &device_.instance, &vulkan),
         "xrCreateVulkanInstanceKHR");
   check(vulkan, "vkCreateInstance");
-  volkLoadInstance(device_.instance);
+  loaded_ = std::make_unique<LoadedInstance>(device_.instance);
 
   auto physicalInfo = typed<XrVulkanGraphicsDeviceGetInfoKHR>(XR_TYPE_VULKAN_GRAPHICS_DEVICE_GET_INFO_KHR);
   physicalInfo.systemId = instance.system();
@@ -53,7 +61,8 @@ void Graphics::choose(const Instance& instance) {
     throw std::runtime_error(reason);
   device_.queueFamily = graphicsQueueFamily(device_.physical).value();
 
-  const DeviceRequest deviceRequest(device_.physical, device_.queueFamily, {});
+  hasDensity_ = wantsDensity && hasDensityMaps(device_.physical);
+  const DeviceRequest deviceRequest(device_.physical, device_.queueFamily, {}, hasDensity_);
   auto deviceInfo = typed<XrVulkanDeviceCreateInfoKHR>(XR_TYPE_VULKAN_DEVICE_CREATE_INFO_KHR);
   deviceInfo.systemId = instance.system();
   deviceInfo.pfnGetInstanceProcAddr = vkGetInstanceProcAddr;

@@ -8,6 +8,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include "clients/xr/render/own_device.h"
+
 namespace clothstream::xr {
 namespace {
 
@@ -65,23 +67,12 @@ std::uint64_t threadCpuUs() {
          static_cast<std::uint64_t>(time.tv_nsec) / 1000;
 }
 
-// Largest number of samples that is wanted and that both formats allow.
-VkSampleCountFlagBits samplesOf(VkPhysicalDevice physical, std::uint32_t wanted) {
-  VkPhysicalDeviceProperties properties;
-  vkGetPhysicalDeviceProperties(physical, &properties);
-  const VkSampleCountFlags allowed =
-      properties.limits.framebufferColorSampleCounts & properties.limits.framebufferDepthSampleCounts;
-  std::uint32_t samples = wanted;
-  while (samples > 1 && (allowed & samples) == 0) samples /= 2;
-  return static_cast<VkSampleCountFlagBits>(samples);
-}
-
 }  // namespace
 
 Headset::Headset(const HeadsetOptions& options, Visit& visit)
     : options_(options),
       visit_(visit),
-      graphics_(instance_),
+      graphics_(instance_, instance_.extensions().foveation && options.foveation != FoveationLevel::kOff),
       session_(instance_, graphics_),
       room_(instance_, session_.get()),
       actions_(instance_, session_.get()),
@@ -124,11 +115,9 @@ void Headset::makePictures() {
   const VkFormat colour = chooseFormat(session_.get(), kColours);
   if (colour == VK_FORMAT_UNDEFINED)
     throw std::runtime_error("The OpenXR runtime offers no format with 8 bits of red, green, blue and alpha");
-  XrSwapchainUsageFlags usage = XR_SWAPCHAIN_USAGE_COLOR_ATTACHMENT_BIT | XR_SWAPCHAIN_USAGE_SAMPLED_BIT;
-  if (!options_.eyePictures.empty()) usage |= XR_SWAPCHAIN_USAGE_TRANSFER_SRC_BIT;
   const VkExtent2D size = pictureSize(instance_, options_.scale);
-  colour_ = std::make_unique<Swapchain>(
-      session_.get(), device.device, Swapchain::Shape{colour, VK_IMAGE_ASPECT_COLOR_BIT, usage, size, kEyes});
+  commands_ = std::make_unique<FrameCommands>(device);
+  makeColour(colour, size);
   RendererOptions renderer;
   if (instance_.extensions().depthLayer) {
     constexpr std::array<VkFormat, 2> kDepths{VK_FORMAT_D32_SFLOAT, VK_FORMAT_D16_UNORM};
@@ -146,14 +135,40 @@ void Headset::makePictures() {
   renderer.views = kEyes;
   renderer.shadows = options_.shadows;
   renderer.largest = size;
+  renderer.hasDensity = colour_->shape().hasDensity;
   renderer_ = std::make_unique<Renderer>(device, renderer);
-  commands_ = std::make_unique<FrameCommands>(device);
   if (!options_.eyePictures.empty())
     pictures_ = std::make_unique<EyePictures>(device, colour_->shape(), options_.eyePictures);
-  spdlog::info("Each eye has {} x {} pixels with {} samples{}{}", size.width, size.height,
+  spdlog::info("Each eye has {} x {} pixels with {} samples{}{}{}", size.width, size.height,
                static_cast<std::uint32_t>(renderer.samples),
+               renderer.hasDensity ? ", fewer at the edges" : "",
                depth_ ? ", and the runtime gets their depth" : "",
                blending_.background == Background::kRoom ? "" : "; the real room is behind");
+}
+
+// Makes the images, with density maps where the runtime gives them.
+void Headset::makeColour(VkFormat format, VkExtent2D size) {
+  Swapchain::Shape shape{format,
+                         VK_IMAGE_ASPECT_COLOR_BIT,
+                         XR_SWAPCHAIN_USAGE_COLOR_ATTACHMENT_BIT | XR_SWAPCHAIN_USAGE_SAMPLED_BIT,
+                         size,
+                         kEyes,
+                         graphics_.hasDensity()};
+  if (!options_.eyePictures.empty()) shape.usage |= XR_SWAPCHAIN_USAGE_TRANSFER_SRC_BIT;
+  if (shape.hasDensity) {
+    try {
+      colour_ = std::make_unique<Swapchain>(session_.get(), graphics_.device().device, shape);
+      colour_->recordDensityLayout(commands_->begin());
+      commands_->submit();
+      commands_->finish();
+      foveate(instance_, session_.get(), colour_->get(), options_.foveation);
+      return;
+    } catch (const XrError& error) {
+      spdlog::warn("The headset does not foveate: {}", error.what());
+      shape.hasDensity = false;
+    }
+  }
+  colour_ = std::make_unique<Swapchain>(session_.get(), graphics_.device().device, shape);
 }
 
 HeadsetStep Headset::step() {
@@ -161,11 +176,8 @@ HeadsetStep Headset::step() {
   if (changes.restarts) return HeadsetStep::restarts;
   if (changes.exits) return HeadsetStep::exits;
   if (changes.profilesChanged) actions_.profilesChanged();
-  if (changes.roomMoved) {
-    spdlog::info("The headset was recentred");
-    room_.changed();
-    movesRoom_ = true;
-  }
+  if (changes.originMoves) originMoves_ = changes.originMoves;
+  if (changes.floorMoves) floorMoves_ = changes.floorMoves;
   if (session_.isRunning()) {
     frame();
   } else {
@@ -183,7 +195,7 @@ void Headset::frame() {
   const auto begin = typed<XrFrameBeginInfo>(XR_TYPE_FRAME_BEGIN_INFO);
   check(xrBeginFrame(session_.get(), &begin), "xrBeginFrame");
   const XrTime time = state.predictedDisplayTime;
-  room_.update(time);
+  moveRoom(time);
   bool isDrawn = false;
   if (state.shouldRender == XR_TRUE) {
     sample_.hasHead = locate(room_.view(), room_.get(), time, sample_.head);
@@ -193,7 +205,7 @@ void Headset::frame() {
     } else {
       for (LimbSample& limb : sample_.limbs) limb.hasHand = false;
     }
-    if (std::exchange(movesRoom_, false) || actions_.recenters()) visit_.recenter();
+    if (std::exchange(recenters_, false) || actions_.recenters()) visit_.recenter();
     visit_.frame(sample_, beginUs, displayUs(state, beginUs));
     for (const Pulse& pulse : visit_.pulses()) actions_.vibrate(pulse);
     isDrawn = locateViews(time);
@@ -206,12 +218,24 @@ void Headset::frame() {
   refreshRate_.suit(visit_.streamRate());
 }
 
-std::uint64_t Headset::displayUs(const XrFrameState& state, std::uint64_t nowUs) {
-  if (convertTime_) {
-    timespec time{};
-    check(convertTime_(instance_.get(), state.predictedDisplayTime, &time), "xrConvertTimeToTimespecTimeKHR");
-    return DisplayClock::convertedUs(std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec, nowUs);
+void Headset::moveRoom(XrTime time) {
+  if (originMoves_ && time >= *originMoves_) {
+    spdlog::info("The headset was recentred");
+    originMoves_.reset();
+    recenters_ = true;
+    room_.changed();
   }
+  if (floorMoves_ && time >= *floorMoves_) {
+    floorMoves_.reset();
+    room_.changed();
+  }
+  room_.update(time);
+}
+
+std::uint64_t Headset::displayUs(const XrFrameState& state, std::uint64_t nowUs) {
+  timespec time{};
+  if (convertTime_ && XR_SUCCEEDED(convertTime_(instance_.get(), state.predictedDisplayTime, &time)))
+    return DisplayClock::convertedUs(std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec, nowUs);
   return clock_.displayUs(state.predictedDisplayTime, state.predictedDisplayPeriod, nowUs);
 }
 
@@ -224,7 +248,8 @@ bool Headset::locateViews(XrTime time) {
   eyes_.fill(typed<XrView>(XR_TYPE_VIEW));
   std::uint32_t count = 0;
   check(xrLocateViews(session_.get(), &info, &state, kEyes, &count, eyes_.data()), "xrLocateViews");
-  if ((state.viewStateFlags & XR_VIEW_STATE_ORIENTATION_VALID_BIT) == 0 || count != kEyes) return false;
+  constexpr XrViewStateFlags kBoth = XR_VIEW_STATE_POSITION_VALID_BIT | XR_VIEW_STATE_ORIENTATION_VALID_BIT;
+  if ((state.viewStateFlags & kBoth) != kBoth || count != kEyes) return false;
   for (std::size_t i = 0; i < kEyes; ++i) {
     const XrFovf& fov = eyes_[i].fov;
     views_[i].view = matrixOf(inverse(visit_.toScene() * poseOf(eyes_[i].pose)));
@@ -243,7 +268,8 @@ void Headset::draw() {
   colour_->acquire();
   if (depth_) depth_->acquire();
   const VkCommandBuffer commands = commands_->begin();
-  const Target target{colour_->view(), depth_ ? depth_->view() : VK_NULL_HANDLE, colour_->shape().size};
+  const Target target{colour_->view(), depth_ ? depth_->view() : VK_NULL_HANDLE, colour_->shape().size,
+                      colour_->density()};
   renderer_->record(commands, target, views_, stage);
   const bool isKept = pictures_ && frames_ % options_.pictureEvery == 0;
   if (isKept) pictures_->record(commands, colour_->image());

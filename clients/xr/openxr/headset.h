@@ -4,11 +4,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "clients/xr/openxr/actions.h"
 #include "clients/xr/openxr/eye_pictures.h"
+#include "clients/xr/openxr/foveation.h"
 #include "clients/xr/openxr/graphics.h"
 #include "clients/xr/openxr/hand_trackers.h"
 #include "clients/xr/openxr/instance.h"
@@ -25,6 +27,7 @@
 namespace clothstream::xr {
 
 struct HeadsetOptions {
+  FoveationLevel foveation = FoveationLevel::kLow;
   bool passThrough = false;   // show the real room where the headset can
   float refreshRate = 0;      // Hz; 0 means one that suits the stream
   std::uint32_t samples = 4;  // per pixel: 1, 2, 4 or 8
@@ -46,13 +49,17 @@ class Headset {
 
   // One displayed frame, or a short wait without one. Throws an XrError if the runtime is lost.
   HeadsetStep step();
-  void requestExit() { session_.requestExit(); }
+  // Asks the runtime to end the session, of which step() tells. Returns false if nothing follows.
+  bool requestExit() { return session_.requestExit(); }
 
  private:
   struct Layers;
 
   void makePictures();
+  void makeColour(VkFormat format, VkExtent2D size);
   void frame();
+  // Follows changes of spaces that hold at this display time.
+  void moveRoom(XrTime time);
   bool locateViews(XrTime time);
   void draw();
   void end(const XrFrameState& state, bool isDrawn);
@@ -81,7 +88,8 @@ class Headset {
   std::array<XrCompositionLayerProjectionView, 2> shown_{};
   std::array<XrCompositionLayerDepthInfoKHR, 2> shownDepth_{};
   std::uint64_t topology_ = 0, frames_ = 0;
-  bool movesRoom_ = false;
+  std::optional<XrTime> originMoves_, floorMoves_;  // as in SessionChanges
+  bool recenters_ = false;                          // in the next frame that is drawn
 };
 
 }  // namespace clothstream::xr

@@ -47,7 +47,7 @@ XrDebugUtilsMessengerCreateInfoEXT messengerInfo() {
           result,
           "No OpenXR runtime is active (" + name +
               "). Start SteamVR, Monado or WiVRn and make it the active runtime, or set XR_RUNTIME_JSON to "
-              "its manifest. Without a headset, use --flat.");
+              "its manifest. --verbose shows what was tried. Without a headset, use --flat.");
     case XR_ERROR_RUNTIME_FAILURE:
     case XR_ERROR_INITIALIZATION_FAILED:
     case XR_ERROR_INSTANCE_LOST:
@@ -84,6 +84,13 @@ Instance::Instance() {
     if (has) used.push_back(name);
     return has;
   };
+  // All of them, or none.
+  const auto useAll = [&](std::initializer_list<const char*> names) {
+    const std::size_t before = used.size();
+    if (std::ranges::all_of(names, use)) return true;
+    used.resize(before);
+    return false;
+  };
   if (!use(XR_KHR_VULKAN_ENABLE2_EXTENSION_NAME))
     throw XrError(
         XR_ERROR_EXTENSION_NOT_PRESENT,
@@ -96,6 +103,9 @@ Instance::Instance() {
                  .convertTime = use(XR_KHR_CONVERT_TIMESPEC_TIME_EXTENSION_NAME),
                  .passthrough = use(XR_FB_PASSTHROUGH_EXTENSION_NAME),
                  .refreshRate = use(XR_FB_DISPLAY_REFRESH_RATE_EXTENSION_NAME),
+                 .foveation = useAll(
+                     {XR_FB_SWAPCHAIN_UPDATE_STATE_EXTENSION_NAME, XR_FB_FOVEATION_EXTENSION_NAME,
+                      XR_FB_FOVEATION_CONFIGURATION_EXTENSION_NAME, XR_FB_FOVEATION_VULKAN_EXTENSION_NAME}),
                  .debugUtils = use(XR_EXT_DEBUG_UTILS_EXTENSION_NAME)};
   auto info = typed<XrInstanceCreateInfo>(XR_TYPE_INSTANCE_CREATE_INFO);
   const XrDebugUtilsMessengerCreateInfoEXT messenger = messengerInfo();

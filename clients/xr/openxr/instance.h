@@ -19,6 +19,7 @@ struct Extensions {
   bool convertTime = false;  // XrTime to CLOCK_MONOTONIC
   bool passthrough = false;  // XR_FB_passthrough
   bool refreshRate = false;  // XR_FB_display_refresh_rate
+  bool foveation = false;    // XR_FB_foveation with levels and Vulkan
   bool debugUtils = false;
 };
 

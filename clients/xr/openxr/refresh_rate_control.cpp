@@ -27,7 +27,8 @@ void RefreshRateControl::suit(float streamRate) {
   if (offered_.empty() || streamRate == streamRate_) return;
   streamRate_ = streamRate;
   float current = 0;
-  check(get_(session_, &current), "xrGetDisplayRefreshRateFB");
+  if (const XrResult result = get_(session_, &current); XR_FAILED(result))
+    return spdlog::warn("The runtime does not say the refresh rate of the headset: {}", nameOf(result));
   const float chosen = chooseRefreshRate(offered_, wanted_, streamRate, current);
   if (chosen <= 0 || chosen == current) return;
   const XrResult result = request_(session_, chosen);

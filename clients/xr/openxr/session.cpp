@@ -1,9 +1,23 @@
 // SPDX-License-Identifier: MIT
 #include "clients/xr/openxr/session.h"
 
+#include <algorithm>
+
 #include <spdlog/spdlog.h>
 
 namespace clothstream::xr {
+namespace {
+
+void readSpaceChange(const XrEventDataReferenceSpaceChangePending& event, SessionChanges& changes) {
+  const bool isStage = event.referenceSpaceType == XR_REFERENCE_SPACE_TYPE_STAGE;
+  const bool isOrigin = event.referenceSpaceType == XR_REFERENCE_SPACE_TYPE_LOCAL ||
+                        event.referenceSpaceType == kLocalFloorSpace;
+  if (!isStage && !isOrigin) return;
+  std::optional<XrTime>& moves = isStage ? changes.floorMoves : changes.originMoves;
+  moves = std::max(event.changeTime, moves.value_or(event.changeTime));
+}
+
+}  // namespace
 
 Session::Session(const Instance& instance, const Graphics& graphics) : instance_(instance.get()) {
   const XrGraphicsBindingVulkan2KHR binding = graphics.binding();
@@ -31,7 +45,7 @@ SessionChanges Session::poll() {
         changeState(reinterpret_cast<const XrEventDataSessionStateChanged&>(buffer).state, changes);
         break;
       case XR_TYPE_EVENT_DATA_REFERENCE_SPACE_CHANGE_PENDING:
-        changes.roomMoved = true;
+        readSpaceChange(reinterpret_cast<const XrEventDataReferenceSpaceChangePending&>(buffer), changes);
         break;
       case XR_TYPE_EVENT_DATA_INTERACTION_PROFILE_CHANGED:
         changes.profilesChanged = true;
@@ -45,6 +59,8 @@ SessionChanges Session::poll() {
       case XR_TYPE_EVENT_DATA_EVENTS_LOST:
         spdlog::warn("The OpenXR runtime has lost {} events",
                      reinterpret_cast<const XrEventDataEventsLost&>(buffer).lostEventCount);
+        // A state that is lost is noticed by the next call that it forbids, which ends in a new session.
+        changes.profilesChanged = true;
         break;
       default:
         break;
@@ -80,10 +96,11 @@ void Session::changeState(XrSessionState state, SessionChanges& changes) {
   }
 }
 
-void Session::requestExit() {
-  if (!isRunning_) return;
-  if (const XrResult result = xrRequestExitSession(session_); XR_FAILED(result))
-    spdlog::warn("xrRequestExitSession failed: {}", nameOf(result));
+bool Session::requestExit() {
+  if (!isRunning_) return false;
+  const XrResult result = xrRequestExitSession(session_);
+  if (XR_FAILED(result)) spdlog::warn("xrRequestExitSession failed: {}", nameOf(result));
+  return XR_SUCCEEDED(result);
 }
 
 }  // namespace clothstream::xr

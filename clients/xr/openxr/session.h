@@ -2,6 +2,8 @@
 // A session of OpenXR and the states that the runtime gives it.
 #pragma once
 
+#include <optional>
+
 #include "clients/xr/openxr/graphics.h"
 #include "clients/xr/openxr/instance.h"
 
@@ -11,8 +13,10 @@ namespace clothstream::xr {
 struct SessionChanges {
   bool restarts = false;         // instance or session are lost: make everything again
   bool exits = false;            // the user has closed the program
-  bool roomMoved = false;        // the user was recentred
   bool profilesChanged = false;  // other controllers, or hands
+  // Times from which the origin of LOCAL is elsewhere, because the user was recentred, and from which the
+  // floor is that of another STAGE.
+  std::optional<XrTime> originMoves, floorMoves;
 };
 
 class Session {
@@ -29,8 +33,9 @@ class Session {
   bool isRunning() const { return isRunning_; }
   // Input belongs to this program.
   bool hasFocus() const { return state_ == XR_SESSION_STATE_FOCUSED; }
-  // Asks the runtime to end the session; poll() reports `exits` when it has.
-  void requestExit();
+  // Asks the runtime to end the session; poll() reports `exits` when it has. Returns false if the session
+  // does not run, so that nothing follows.
+  bool requestExit();
 
  private:
   void changeState(XrSessionState state, SessionChanges& changes);

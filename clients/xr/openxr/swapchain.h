@@ -17,6 +17,7 @@ class Swapchain {
     XrSwapchainUsageFlags usage = 0;
     VkExtent2D size{};
     std::uint32_t layers = 2;
+    bool hasDensity = false;  // each image has a density map of the runtime
   };
   Swapchain(XrSession session, VkDevice device, const Shape& shape);
   ~Swapchain();
@@ -32,13 +33,21 @@ class Swapchain {
   // The acquired image, and a view of all its layers.
   VkImage image() const { return images_[index_]; }
   VkImageView view() const { return views_[index_]; }
+  // Density map of the acquired image; null without one.
+  VkImageView density() const { return densityViews_.empty() ? VK_NULL_HANDLE : densityViews_[index_]; }
+  // Records the change of all density maps to the layout in which they are read. Their contents are
+  // discarded: call it once, before foveate().
+  void recordDensityLayout(VkCommandBuffer commands) const;
 
  private:
+  void makeViews();
+  void destroy();
+
   VkDevice device_;
   Shape shape_;
   XrSwapchain swapchain_ = XR_NULL_HANDLE;
-  std::vector<VkImage> images_;
-  std::vector<VkImageView> views_;
+  std::vector<VkImage> images_, densityImages_;
+  std::vector<VkImageView> views_, densityViews_;
   std::uint32_t index_ = 0;
 };
 

@@ -9,6 +9,10 @@
 namespace clothstream::xr {
 namespace {
 
+const std::string kNoDriver =
+    "no Vulkan device can draw the scene, because no driver is installed. Install one, such as Debian's "
+    "mesa-vulkan-drivers, which has a software device too.";
+
 // The smaller, the better.
 int rankOf(VkPhysicalDevice physical) {
   VkPhysicalDeviceProperties properties{};
@@ -30,7 +34,9 @@ int rankOf(VkPhysicalDevice physical) {
 OwnDevice::OwnDevice(std::span<const char* const> instanceExtensions,
                      std::span<const char* const> deviceExtensions) {
   const InstanceRequest request(instanceExtensions);
-  check(vkCreateInstance(request.info(), nullptr, &device_.instance), "vkCreateInstance");
+  const VkResult result = vkCreateInstance(request.info(), nullptr, &device_.instance);
+  if (result == VK_ERROR_INCOMPATIBLE_DRIVER) throw std::runtime_error(kNoDriver);
+  check(result, "vkCreateInstance");
   try {
     loaded_ = std::make_unique<LoadedInstance>(device_.instance);
     choose(deviceExtensions);
@@ -76,10 +82,7 @@ void OwnDevice::choose(std::span<const char* const> extensions) {
     name_ = properties.deviceName;
     return;
   }
-  throw std::runtime_error("no Vulkan device can draw the scene." + reasons +
-                           (devices.empty() ? " There is no device: install a driver, such as Debian's "
-                                              "mesa-vulkan-drivers, which has a software device too."
-                                            : ""));
+  throw std::runtime_error(devices.empty() ? kNoDriver : "no Vulkan device can draw the scene." + reasons);
 }
 
 VkSampleCountFlagBits samplesOf(VkPhysicalDevice physical, std::uint32_t wanted) {

@@ -50,7 +50,7 @@ bool shapeOf(const cs_collider& collider, float shrink, Solid& solid) {
 Pose poseOf(const cs_collider& collider) {
   const float* q = collider.orientation;
   return {Eigen::Vector3f(collider.position[0], collider.position[1], collider.position[2]),
-          Eigen::Quaternionf(q[3], q[0], q[1], q[2])};
+          Eigen::Quaternionf(q[3], q[0], q[1], q[2]).normalized()};
 }
 
 Colour colourOf(std::uint64_t participant) {

@@ -6,6 +6,9 @@
 namespace clothstream::xr {
 namespace {
 
+// Colliders farther away are not part of what the user stands before, m. Vertices are nowhere farther.
+constexpr float kFarthest = 1e6f;
+
 // Radius of a ball around the middle of a collider that contains it; hulls are not measured.
 float radiusOf(const cs_collider& collider) {
   switch (collider.shape) {
@@ -36,10 +39,13 @@ SceneBounds boundsOf(const cs_client* client) {
   for (std::uint32_t i = 0; i < cs_collider_count(client); ++i) {
     cs_collider collider;
     if (!cs_get_collider(client, i, &collider) || collider.participant_id != 0) continue;
+    const Eigen::Vector3f middle(collider.position);
+    const float radius = radiusOf(collider);
+    if (!(middle.cwiseAbs().maxCoeff() + radius < kFarthest)) continue;
     if (collider.shape == CS_SHAPE_PLANE) {
-      floor = collider.position[1];
+      floor = middle.y();
     } else {
-      add(Eigen::Vector3f(collider.position), radiusOf(collider));
+      add(middle, radius);
     }
   }
   bounds.least.y() = floor;

@@ -9,6 +9,7 @@
 #include "clients/xr/panel/panel_facts.h"
 #include "clients/xr/stage/solids.h"
 #include "clients/xr/visit/shown_cloth.h"
+#include "proto/text/printable.h"
 
 namespace clothstream::xr {
 namespace {
@@ -31,6 +32,7 @@ Visit::Visit(ConnectionOptions options, TextPainter& painter)
 void Visit::frame(const InputSample& sample, std::uint64_t nowUs, std::uint64_t displayUs) {
   pulseCount_ = 0;
   events_ |= connection_.update(nowUs);
+  if (std::string notice = connection_.takeNotice(); !notice.empty()) say(std::move(notice), nowUs);
   {
     const Connection::Acquired acquired = connection_.acquire();
     cs_client* const client = acquired.client();
@@ -48,14 +50,16 @@ void Visit::frame(const InputSample& sample, std::uint64_t nowUs, std::uint64_t 
       const ShownCloth cloth(client);
       point(&cloth, nowUs, client);
       touch_.grab(cloth);
-      sent_ = touch_.input();
+    } else {
+      point(nullptr, nowUs, nullptr);
+    }
+    sent_ = touch_.input();
+    if (client) {
       sender_.send(client, sent_, displayUs);
       cs_play_out(client, nowUs, displayUs, nullptr);
       streamRate_ = static_cast<float>(cs_stream_rate(client));
       reader_.read(client, events_, false, stage_);
       events_ = 0;
-    } else {
-      point(nullptr, nowUs, nullptr);
     }
     if (nowUs - factsUs_ >= kFactsEvery) readFacts(client, nowUs);
     drawOwn(client);
@@ -82,7 +86,8 @@ void Visit::say(std::string_view text, std::uint64_t nowUs) {
 // Puts scene and panel before the user in the first frame, and when a scene has arrived.
 void Visit::place(const InputSample& sample, const cs_client* client) {
   const bool hasScene = client && cs_vertex_count(client) > 0;
-  if (!sample.hasHead || (isPlaced_ && (placedWithScene_ || !hasScene))) return;
+  const bool isWanted = !isPlaced_ || (hasScene && !placedWithScene_);
+  if (!isWanted || !sample.hasHead || !isPossible(sample.head)) return;
   placement_.placeBefore(sample.head, hasScene ? boundsOf(client) : SceneBounds{});
   seat_.seat(sample.head);
   isPlaced_ = true;
@@ -118,7 +123,7 @@ void Visit::point(const Touchable* cloth, std::uint64_t nowUs, cs_client* client
 void Visit::act(const PanelAction& action, cs_client* client) {
   switch (action.kind) {
     case PanelActionKind::kJoinScene:
-      spdlog::info("The user chooses the scene {}", action.scene);
+      spdlog::info("The user chooses the scene {}", printable(action.scene));
       return connection_.join(action.scene);
     case PanelActionKind::kQuality:
       return connection_.setQuality(action.quality);

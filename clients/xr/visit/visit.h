@@ -55,6 +55,8 @@ class Visit {
   void addFrameTime(std::uint64_t nowUs, std::uint64_t cpuUs) { times_.add(nowUs, cpuUs); }
   const FrameTimes& frameTimes() const { return times_; }
   const Connection& connection() const { return connection_; }
+  // Leaves the scene, as Connection::leave().
+  bool leave() { return connection_.leave(); }
 
  private:
   void place(const InputSample& sample, const cs_client* client);

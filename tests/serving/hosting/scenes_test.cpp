@@ -131,7 +131,9 @@ TEST_F(ScenesTest, ArrivalThatCannotStartFreesItsPlace) {
   {
     auto arriving = server().created.prepareArrival(saved);
     ASSERT_TRUE(arriving) << arriving.error();
-    saved.checkpoint.emplace().scene = saved.start;  // its state has no nodes
+    scene::Checkpoint& checkpoint = saved.checkpoint.emplace();  // its state has no nodes
+    checkpoint.scene = saved.start;
+    checkpoint.colliders = scene::ColliderSet(saved.start).state();
     EXPECT_ANY_THROW(arriving->start(saved));
     EXPECT_FALSE(server().scenes.find("arrives"));
   }

@@ -14,6 +14,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 using tests::TestPeer;
 using Body = v1::ServerMessage;
 
@@ -351,7 +352,36 @@ TEST_F(SurfacesTest, AreLimitedWhileTheyArrive) {
   part.set_index(10);
   const v1::Error error = refused(peer, message);
   EXPECT_EQ(error.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
-  EXPECT_THAT(error.text(), HasSubstr("55000 triangles"));
+  EXPECT_THAT(error.text(), StartsWith("surface.id = 0: 55000 triangles"));
+  // The parts that follow get no error of their own, and another mesh begins.
+  part.clear_triangles();
+  for (std::uint32_t index = 11; index < 20; ++index) {
+    part.set_index(index);
+    peer.send(message);
+  }
+  sendAll(peer, partsOf(2, model::flat(1, 1), 10, 0));
+  awaitSurfaces(peer, "small", 1);
+  part.set_index(3);
+  EXPECT_THAT(refused(peer, message).text(),
+              StartsWith("surface.part.index = 3 of 20, surface 0: must be 0;"));
+}
+
+// All participants wait for one thread that makes surfaces.
+TEST_F(SurfacesTest, AreLimitedInTrianglesPerSecond) {
+  START_SURFACES();
+  TestPeer peer(server());
+  peer.join();
+  v1::ClientMessage message;
+  v1::SurfacePart& part = *message.mutable_surface()->mutable_part();
+  part.set_count(1);
+  for (int i = 0; i < 3 * 20'000; ++i) part.add_triangles(0);
+  // The room for 300,000 at once, and for 150,000 more in each second, ends within 3 s.
+  for (int mesh = 0; mesh < 40; ++mesh) peer.send(message);
+  v1::Error error = refused(peer);
+  // Meshes that were accepted have no vertices, which is found later.
+  while (error.code() == v1::ERROR_CODE_INVALID_ARGUMENT) error = refused(peer);
+  EXPECT_EQ(error.code(), v1::ERROR_CODE_RATE_LIMITED);
+  EXPECT_THAT(error.text(), StartsWith("surface.id = 0: too many triangles in a short time"));
 }
 
 TEST_F(SurfacesTest, UseTheMemoryOfUploads) {
@@ -377,7 +407,7 @@ TEST_F(SurfacesTest, AreRefusedBeyondTheBudget) {
   sendAll(peer, partsOf(1, model::flat(1, 1), 10, 0));
   const v1::Error error = refused(peer);
   EXPECT_EQ(error.code(), v1::ERROR_CODE_RESOURCE_EXHAUSTED);
-  EXPECT_THAT(error.text(), AllOf(HasSubstr("surface: would take"), HasSubstr("--max-memory")));
+  EXPECT_THAT(error.text(), AllOf(HasSubstr("surface.id = 1: would take"), HasSubstr("--max-memory")));
 }
 
 }  // namespace

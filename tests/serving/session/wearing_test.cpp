@@ -37,7 +37,7 @@ class WearingTest : public tests::ServerTest {
     for (const char* name : {"giant", "avatar"})
       scene.colliders.push_back({.name = name, .shape = std::make_shared<const model::ClosedMesh>(rod)});
     scene.colliders[1].motion.keys = {{0, {2, 0, 0}}, {1, {2, 0, 1}}, {2, {2, 0, 0}}};
-    scene.colliders[2].motion.keys = {{0, {-2, 0, 0}}};
+    scene.colliders[2].pose.position = {-2, 0, 0};
     return scene;
   }
   static v1::ClientMessage wearing(const std::string& body, std::optional<float> z = {}) {
@@ -145,7 +145,7 @@ TEST_F(WearingTest, ErrorsSayWhatIsWrongAndChangeNothing) {
   }
   EXPECT_EQ(bodyOf(peer.welcome().participant_id()), "avatar");
   EXPECT_EQ(bodyOf(other.welcome().participant_id()), "");
-  EXPECT_EQ(live().definition().colliders[2].motion.keys.front().position.x(), -2);
+  EXPECT_EQ(live().definition().colliders[2].pose.position.x(), -2);
 }
 
 // The collider of a body stands by a change of parameters, which the server refuses if there were too many.

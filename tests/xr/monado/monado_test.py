@@ -11,8 +11,10 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -25,6 +27,9 @@ from programs import Server, wait_until  # noqa: E402
 
 GRAB_TAKEN = 1  # cs_grab_event_kind
 RADIUS = 0.045  # of the sphere of a controller, m
+THUMB, INDEX, WRIST = 2, 6, 19  # bones of a hand (proto/hands/bones.h)
+# Grabber::kReach, and half the length of the last bones, in whose middle fingers() is, m.
+REACH = 0.12
 # The largest depth of a vertex in a collider that is no penetration: rounding of positions in the stream.
 ROUNDING = 0.002
 # Software Vulkan draws slowly.
@@ -125,6 +130,20 @@ class WithMonado(unittest.TestCase):
         """Number of colliders of the visor's hands."""
         return sum(each.participant_id == visor and each.name.isdecimal() and 2**31 <= int(each.name) < 2**31 + 64 for each in frame.colliders)
 
+    def bone(self, frame, visor, number):
+        """Middle of a bone of the visor's right hand."""
+        name = str(2**31 + 32 + number)
+        return next(np.array(each.position) for each in frame.colliders if each.participant_id == visor and each.name == name)
+
+    def fingers(self, frame, visor):
+        """Middle of the last bones of thumb and index finger."""
+        return (self.bone(frame, visor, THUMB) + self.bone(frame, visor, INDEX)) / 2
+
+    def takes(self, observer, visor):
+        """Whether a grab of the visor takes hold in the next frame."""
+        observer.next_frame()
+        return any(each.participant_id == visor and each.kind == GRAB_TAKEN and each.vertices > 0 for each in observer.grab_events)
+
     def nearest(self, frame, visor, point):
         """Centre of the controller's sphere that is nearest to a point."""
         return min(self.own(frame, visor), key=lambda sphere: np.linalg.norm(sphere - point))
@@ -207,10 +226,7 @@ class Touching(WithMonado):
         touched = np.linalg.norm(frame.positions - sphere, axis=1) < RADIUS + 0.05
         self.remote.right.squeeze = 1.0
         self.remote.send()
-        taken = lambda: observer.next_frame() and any(
-            each.participant_id == visor and each.kind == GRAB_TAKEN and each.vertices > 0 for each in observer.grab_events
-        )
-        wait_until(taken, "the grab")
+        wait_until(lambda: self.takes(observer, visor), "the grab")
         self.look("grabbed")
         self.carry(observer, visor, to_scene, (0.05, 1.6, 0.3))
         frame = settle(observer, 60)
@@ -228,6 +244,60 @@ class Touching(WithMonado):
         frame = settle(observer, 240)
         self.assertLess(np.abs(frame.positions - rest)[:, 2].max(), 0.2)
         self.look("released")
+        self.end(client)
+
+    def test_hand_pinches_and_lifts(self):
+        self.start_server()
+        self.start_monado()
+        client = self.start_client()
+        client.wait_for(FOCUSED)
+        observer = self.observe()
+        visor = self.find_visor(observer)
+        wait_until(lambda: len(self.own(observer.next_frame(), visor)) == 2, "both controllers")
+        self.remote.left.active = False
+        hand = self.remote.right
+        hand.active, hand.tracks_hand, hand.pinch = False, True, 1.0
+        self.remote.send()
+        wait_until(lambda: self.bones(observer.next_frame(), visor) == 20, "the right hand")
+        frame = settle(observer, 30)
+        # The scene is 0.5 m behind the origin of the room; the parts of a hand keep their places in it.
+        to_scene = np.array((0, 0, 0.5))
+        fingers = self.fingers(frame, visor) - to_scene - hand.position
+        wrist = self.bone(frame, visor, WRIST) - to_scene - hand.position
+
+        def carry(to):
+            """Moves the fingers to a point of the scene in steps, each of which the server has before the next one."""
+            start, end = np.array(hand.position), np.array(to) - to_scene - fingers
+            steps = math.ceil(np.linalg.norm(end - start) / 0.03)
+            for part in range(1, steps + 1):
+                hand.position = tuple(start + (end - start) * part / steps)
+                self.remote.send()
+                there = hand.position + to_scene + wrist
+                wait_until(
+                    lambda: np.linalg.norm(self.bone(observer.next_frame(), visor, WRIST) - there) < 0.01, f"a wrist at {there}"
+                )
+
+        hand.pinch = 0.0
+        self.remote.send()
+        carry((0.05, 1.2, 0.08))
+        rest = settle(observer).positions.copy()
+        hand.pinch = 1.0
+        self.remote.send()
+        wait_until(lambda: self.takes(observer, visor), "the grab")
+        self.look("pinched")
+        near = np.linalg.norm(rest - self.fingers(observer.next_frame(), visor), axis=1) < REACH
+        carry((0.05, 1.6, 0.3))
+        frame = settle(observer, 60)
+        held = np.linalg.norm(frame.positions[near] - self.fingers(frame, visor), axis=1).min()
+        lifted = (frame.positions[near, 1] - rest[near, 1]).max()
+        print(f"pinched: lifted by {lifted:.3f} m; the held vertex is {held:.3f} m from the fingers", flush=True)
+        self.look("pinched_and_lifted")
+        self.assertGreater(lifted, 0.3)
+        self.assertLess(held, REACH)
+        hand.pinch = 0.0
+        self.remote.send()
+        frame = settle(observer, 240)
+        self.assertLess((frame.positions[near, 1] - rest[near, 1]).max(), 0.2, "the open hand lets go")
         self.end(client)
 
     def test_hands_replace_controllers_and_come_back(self):
@@ -287,6 +357,21 @@ class Life(WithMonado):
         self.assertEqual(self.find_visor(observer), visor)
         self.look("after_restart", after=5)
         self.end(client)
+
+    def test_ends_although_the_runtime_hangs(self):
+        self.start_server()
+        monado = self.start_monado()
+        for signals, status in ((1, 1), (2, 128 + signal.SIGTERM)):
+            client = self.start_client()
+            client.wait_for(FOCUSED)
+            monado.process.send_signal(signal.SIGSTOP)
+            client.ask_to_stop()
+            if signals == 2:
+                time.sleep(1)  # the runtime would have ended the session by now
+                client.ask_to_stop()
+            self.assertEqual(client.process.wait(30), status, client.tail())
+            monado.process.send_signal(signal.SIGCONT)
+        self.assertIn("The program is stopped: 10 s after a signal", (self.root.folder / "client.log").read_text())
 
     def test_server_is_killed_and_started_again(self):
         server = self.start_server()

@@ -25,14 +25,15 @@ class Controller:
     position: tuple = (0.0, 1.0, 0.0)
     orientation: tuple = UPRIGHT
     active: bool = True
-    tracks_hand: bool = False  # the driver makes a hand of the pose and `curl`
-    curl: float = 0.0  # of all fingers, 0 to 1
+    tracks_hand: bool = False  # the driver makes a hand of the pose, `curl` and `pinch`
+    curl: float = 0.0  # of little finger, ring finger and middle finger, 0 to 1
+    pinch: float = 0.0  # curl of index finger and thumb, whose tips meet
     trigger: float = 0.0
     squeeze: float = 0.0
     menu: bool = False  # the button B of a Valve Index controller
 
     def packed(self):
-        values = [*self.orientation, *self.position, *[0.0] * 6, *[self.curl] * 5]
+        values = [*self.orientation, *self.position, *[0.0] * 6, *[self.curl] * 3, *[self.pinch] * 2]
         values += [self.trigger, self.squeeze, self.squeeze, *[0.0] * 5]
         # hand, active; then clicks and touches of: system, a, b, trigger, thumbstick; touch of the trackpad.
         flags = [self.tracks_hand, self.active, False, False, False, False, self.menu, self.menu, self.trigger > 0.9]

@@ -39,7 +39,8 @@ namespace ClothStream
         readonly PinchGrab[] grabs = { new PinchGrab(0), new PinchGrab(1) };
         readonly Grab[] held = new Grab[2];
         readonly ClothPoint[] heldPlaces = new ClothPoint[2];
-        readonly float[] joints = new float[4 * Joints], position = new float[3], orientation = new float[4];
+        readonly float[] joints = new float[4 * Joints];
+        readonly StreamPose pose = new StreamPose();
         readonly OwnCollider[] spheres = new OwnCollider[2];
         readonly Vector3[] places = new Vector3[Joints];
         readonly float[] radii = new float[Joints];
@@ -86,8 +87,8 @@ namespace ClothStream
             client.SetShapes(spheres, sphereCount, nowUs);
             client.SetGrabs(held, heldPlaces, count, nowUs);
             if (head == null) return;
-            Store(connection.ToStream(head.position), connection.ToStream(head.rotation));
-            client.SetHead(position, orientation, headRadius, nowUs);
+            pose.Set(connection.ToStream(head.position), connection.ToStream(head.rotation));
+            client.SetHead(pose.Position, pose.Orientation, headRadius, nowUs);
             MoveBody(client, person, nowUs);
         }
 
@@ -150,9 +151,9 @@ namespace ClothStream
 
         void UpdateGrab(Client client, PinchGrab grab, HandSample sample)
         {
-            Store(connection.ToStream(sample.position), connection.ToStream(sample.rotation));
+            pose.Set(connection.ToStream(sample.position), connection.ToStream(sample.rotation));
             grab.Reach = grabReach;
-            grab.Update(client, sample.strength, position, orientation);
+            grab.Update(client, sample.strength, pose.Position, pose.Orientation);
         }
 
         float[] StreamJoints(HandSample sample)
@@ -176,17 +177,6 @@ namespace ClothStream
             sphere.position[1] = point.y;
             sphere.position[2] = point.z;
             return sphere;
-        }
-
-        void Store(Vector3 at, Quaternion turned)
-        {
-            position[0] = at.x;
-            position[1] = at.y;
-            position[2] = at.z;
-            orientation[0] = turned.x;
-            orientation[1] = turned.y;
-            orientation[2] = turned.z;
-            orientation[3] = turned.w;
         }
     }
 }

@@ -15,7 +15,7 @@ namespace ClothStream
         static readonly List<Vector3> vertices = new List<Vector3>();
         static readonly List<int> corners = new List<int>(), part = new List<int>();
 
-        readonly float[] position = new float[3], orientation = new float[4];
+        readonly StreamPose pose = new StreamPose();
         float[] positions = new float[0];
         uint[] triangles = new uint[0];
         bool isSent, wasRefused;
@@ -39,8 +39,8 @@ namespace ClothStream
                 Remove(client);
                 return !wasRefused;
             }
-            if (isSent && !hasChanged) return !hasMoved || client.MoveSurface(Id, position, orientation);
-            isSent = client.SetSurface(Id, positions, triangles, position, orientation, twoSided, friction);
+            if (isSent && !hasChanged) return !hasMoved || client.MoveSurface(Id, pose.Position, pose.Orientation);
+            isSent = client.SetSurface(Id, positions, triangles, pose.Position, pose.Orientation, twoSided, friction);
             wasRefused = !isSent;
             return isSent;
         }
@@ -60,6 +60,7 @@ namespace ClothStream
         // Returns whether the pose has changed.
         bool ReadPose(ClothStreamConnection connection, Transform transform)
         {
+            float[] position = pose.Position, orientation = pose.Orientation;
             Vector3 at = connection.ToStream(transform.position);
             Quaternion turned = connection.ToStream(transform.rotation);
             float away = Mathf.Max(Mathf.Max(Mathf.Abs(at.x - position[0]), Mathf.Abs(at.y - position[1])), Mathf.Abs(at.z - position[2]));
@@ -69,13 +70,7 @@ namespace ClothStream
             float turn = Mathf.Max(Mathf.Max(Mathf.Abs(sign * turned.x - orientation[0]), Mathf.Abs(sign * turned.y - orientation[1])),
                                    Mathf.Max(Mathf.Abs(sign * turned.z - orientation[2]), Mathf.Abs(sign * turned.w - orientation[3])));
             if (isSent && away < SamePlace && turn < SameTurn) return false;
-            position[0] = at.x;
-            position[1] = at.y;
-            position[2] = at.z;
-            orientation[0] = turned.x;
-            orientation[1] = turned.y;
-            orientation[2] = turned.z;
-            orientation[3] = turned.w;
+            pose.Set(at, turned);
             return true;
         }
 
