@@ -4,9 +4,12 @@
 
 #include <cstdlib>
 #include <new>
+#include <stdexcept>
+
+#include <clothstream/clothstream.h>
 
 namespace {
-thread_local std::size_t allocations = 0;
+thread_local std::size_t allocations = 0, libraryAllocations = 0;
 }
 
 extern "C" {
@@ -41,9 +44,26 @@ void operator delete(void* memory, std::size_t) noexcept {
 
 namespace clothstream::xr::tests {
 
-Allocations::Allocations() : before_(allocations) {}
+Allocations::Allocations() : before_(allocations), libraryBefore_(libraryAllocations) {}
 std::size_t Allocations::count() const {
   return allocations - before_;
+}
+
+std::size_t Allocations::ofLibrary() const {
+  return libraryAllocations - libraryBefore_;
+}
+
+void countAllocationsOfLibrary() {
+  clothstream_allocator allocator{};
+  allocator.version = CLOTHSTREAM_ALLOCATOR_VERSION;
+  allocator.allocate = [](void*, std::size_t bytes, std::size_t alignment) -> void* {
+    ++libraryAllocations;
+    if (alignment <= alignof(std::max_align_t)) return __real_malloc(bytes);
+    return std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+  };
+  allocator.release = [](void*, void* memory) { std::free(memory); };
+  if (clothstream_set_allocator(&allocator) != CLOTHSTREAM_OK)
+    throw std::runtime_error(clothstream_error_text());
 }
 
 }  // namespace clothstream::xr::tests

@@ -24,7 +24,9 @@ const Colour kRayColour = fromSrgb(0xE6A850);
 
 Visit::Visit(ConnectionOptions options, TextPainter& painter)
     : connection_(std::move(options)), reader_(painter), panel_(painter) {
+  // The memory of longer texts is allocated when they come.
   facts_.status.reserve(256);
+  said_.reserve(256);
 }
 
 void Visit::frame(const InputSample& sample, std::uint64_t nowUs, std::uint64_t displayUs) {
@@ -75,8 +77,8 @@ void Visit::hidden(std::uint64_t nowUs) {
   sender_.send(acquired.client(), sent_, nowUs);
 }
 
-void Visit::say(std::string text, std::uint64_t nowUs) {
-  said_ = std::move(text);
+void Visit::say(std::string_view text, std::uint64_t nowUs) {
+  said_ = text;
   saidUs_ = nowUs;
   factsUs_ = 0;
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "clients/xr/connection/connection.h"
 #include "clients/xr/input/haptics.h"
@@ -45,7 +46,7 @@ class Visit {
   // Places scene and panel before the user in the next frame.
   void recenter() { isPlaced_ = false; }
   // Shows a text on the panel for a few seconds.
-  void say(std::string text, std::uint64_t nowUs);
+  void say(std::string_view text, std::uint64_t nowUs);
   // The user has pressed the button for leaving.
   bool leaves() const { return leaves_; }
   // Frames per second of the stream; 0 before the description.
