@@ -58,7 +58,7 @@ TEST(ToPoses, RefusesAttachmentsBeyondHalfOfTheRangeOfTheStream) {
 
 // The dress of this scene follows the joints of "avatar", and would take the scene back for everyone if it
 // left the 514.2 m of the stream. Nothing follows "floor".
-TEST(ToPoses, KeepsClothThatFollowsABodyInTheRangeOfTheStreamByPlaceAndJointsTogether) {
+TEST(ToPoses, PlaceAndJointsKeepClothInTheRangeOfTheStream) {
   const model::Scene scene = *loadScene("dress");
   const auto stands = [&](float x) {
     v1::WearBody message;

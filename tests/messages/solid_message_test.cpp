@@ -218,7 +218,7 @@ TEST_F(AvatarFile, IsRefusedWithTheFieldAndTheReason) {
   EXPECT_THAT(errorOf(), StartsWith("colliders[0].mesh.animation = \"bend\": is an animation of a file"));
 }
 
-TEST_F(AvatarFile, IsRefusedForNumbersOutOfTheWorldWithTheJointOrTheTime) {
+TEST_F(AvatarFile, NumbersOutOfTheWorldAreRefusedWithTheirJoint) {
   const auto errorOf = [&](const std::function<void(meshes::SkinnedGlb&)>& spoil) {
     meshes::SkinnedGlb glb;
     spoil(glb);
