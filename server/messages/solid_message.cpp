@@ -119,11 +119,12 @@ std::optional<model::Skin> ofFile(Checks& checks, const Path& path, const std::s
                       i, excerpt(name), limits::kMaxTextBytes));
     place(skin.joints[i].rest, i, [] { return std::string("where the skin binds it"); });
   }
+  // The times of keys increase.
+  if (!skin.keys.empty() && !(skin.keys.back().time <= static_cast<float>(limits::kMotionTime.max)))
+    checks.failNamed(path, file,
+                     fmt::format("has an animation of {:g} s; must be at most {:g} s: export a shorter one",
+                                 skin.keys.back().time, limits::kMotionTime.max));
   for (model::JointKey& key : skin.keys) {
-    if (!(key.time <= static_cast<float>(limits::kMotionTime.max)))
-      checks.failNamed(path, file,
-                       fmt::format("has an animation of {:g} s; must be at most {:g} s: export a shorter one",
-                                   key.time, limits::kMotionTime.max));
     for (std::size_t i = 0; i < key.joints.size(); ++i)
       place(key.joints[i], i, [&] { return fmt::format("{:g} s after the animation begins", key.time); });
   }

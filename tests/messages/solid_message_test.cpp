@@ -240,7 +240,7 @@ TEST_F(AvatarFile, NumbersOutOfTheWorldAreRefusedWithTheirJoint) {
       StartsWith("colliders[0].mesh.file = \"rod.glb\": has the joint \"upper\" 100000 m from its parent, "
                  "along one axis, 0 s after the animation begins; must be within 1000 m"));
   EXPECT_THAT(errorOf([](G& g) { g.root["nodes"][meshes::kUpper]["name"] = "a\x1b"; }),
-              StartsWith("colliders[0].mesh.file = \"rod.glb\": has the joint 1 with the name \"a\\x1B\""));
+              StartsWith("colliders[0].mesh.file = \"rod.glb\": has the joint 1 with the name \"a\\x1b\""));
 }
 
 TEST(SolidMessage, PosesOfJointsAreOfAColliderThatHasThem) {
