@@ -20,8 +20,8 @@ const kScene = { width: 1120, height: 960 };
 const kMiddle = { x: 100, y: 320, width: 720, height: 600 };
 // When a scene shows what it is for (s), and the part of the page where that is (pixels).
 const kPictures = [
-  { scene: "dress", second: 4, part: { x: 0, y: 120, width: 640, height: 560 } },
-  { scene: "gown", second: 2.8, part: { x: 0, y: 120, width: 640, height: 560 } },
+  { scene: "dress", second: 1.5, part: { x: 0, y: 280, width: 400, height: 320 } },
+  { scene: "gown", second: 2.8, part: { x: 20, y: 280, width: 400, height: 320 } },
   { scene: "balloon", second: 0.5, part: { x: 160, y: 160, width: 660, height: 600 } },
   { scene: "cushion", second: 4.5, part: kMiddle },
 ];
@@ -45,20 +45,24 @@ async function untilSecond(page, second) {
   await page.waitForFunction((end) => window.clothstream.statistics.tick / 72 > end, second, { timeout: 0 });
 }
 
-// Returns the file of a recording of the first seconds of a scene.
+// Returns the file of a recording of the first seconds of a scene, and for how many seconds the page saw them: a slow scene
+// takes longer.
 async function recorded(scene, seconds) {
   const own = await mkdtemp(join(folder, "recorded-"));
+  let length = 0;
   const started = await startServer(0, ["--scene", scene, "--record", own]);
   try {
     const page = await openPage(browser, started.url);
     await untilState(page, "live");
+    const begin = performance.now();
     await untilSecond(page, seconds);
+    length = (performance.now() - begin) / 1000;
     await page.close();
   } finally {
     await started.stop();
   }
   const [file] = await readdir(own);
-  return join(own, file);
+  return { file: join(own, file), length };
 }
 
 // Plays a recording slowly, because a picture takes long, and calls `use` with a page that shows nothing else.
@@ -75,8 +79,9 @@ async function playSlowly(recording, from, viewport, use) {
 }
 
 async function pictureOf({ scene, second, part }) {
-  await playSlowly(await recorded(scene, second + 1), second, kScene, async (page) => {
-    await page.waitForFunction((time) => window.clothstream.playback.position >= time, second);
+  const { file, length } = await recorded(scene, second + 1);
+  await playSlowly(file, (length * second) / (second + 1), kScene, async (page) => {
+    await untilSecond(page, second);
     await page.screenshot({ path: join(kDocs, "images", `${scene}.png`), clip: part });
   });
 }
@@ -98,7 +103,8 @@ async function pictureOfPage() {
 
 async function movingPicture() {
   const frames = [];
-  await playSlowly(await recorded("curtain", kStart + kSwing + 1), kStart, kMoving, async (page) => {
+  const { file: curtain } = await recorded("curtain", kStart + kSwing + 1);
+  await playSlowly(curtain, kStart, kMoving, async (page) => {
     for (let frame = 0; frame < kSwing * kFramesPerSecond; ++frame) {
       await page.waitForFunction((time) => window.clothstream.playback.position >= time, kStart + frame / kFramesPerSecond);
       const file = join(folder, `${String(frame).padStart(3, "0")}.png`);

@@ -21,9 +21,11 @@ const kCheapSamples = 5;
 const kCheapRadius = 3.5;
 
 const kDepthPerWidth = kWidth / (kFar - kNear);
-// Largest slope of a surface, and tolerance for its curvature within the reach of a sample.
+// Slope of a surface up to which disks are round, and tolerance for its curvature within the reach of a sample.
 const kSteepest = 6 * kDepthPerWidth;
 const kCurvature = 0.9 * kDepthPerWidth;
+// Offset of a surface towards the light, in depth. One along the normal would turn around where light grazes the surface.
+const kBias = 0.0005 + (3 * kDepthPerWidth) / kTexels;
 const kUvPerDepth = kLightSpread / 2 / kDepthPerWidth;
 
 const kShadowFunction = /* glsl */ `
@@ -32,43 +34,61 @@ vec2 diskSample(int index, int count, float turn) {
   return sqrt((float(index) + 0.5) / float(count)) * vec2(cos(angle), sin(angle));
 }
 
+// A place in the shadow map, and the plane of the surface there.
+struct MapPlace {
+  vec3 coord;
+  vec2 slope;    // of depth along the plane
+  mat2 squeeze;  // makes disks narrow along the slope of steep planes, which would else shade themselves
+};
+
+MapPlace mapPlaceOf(vec3 coord) {
+  vec3 dx = dFdx(coord);
+  vec3 dy = dFdy(coord);
+  float area = dx.x * dy.y - dx.y * dy.x;
+  vec2 slope = vec2(dy.y * dx.z - dx.y * dy.z, dx.x * dy.z - dy.x * dx.z) / (abs(area) > 1e-18 ? area : 1e-18);
+  slope *= min(1.0, 100.0 / max(length(slope), 1e-6));
+  float steepness = max(length(slope), 1e-6);
+  vec2 along = slope / steepness;
+  float narrow = max(0.0, 1.0 - ${kSteepest.toFixed(6)} / steepness);
+  return MapPlace(coord, slope, mat2(1.0) - narrow * mat2(along.x * along, along.y * along));
+}
+
+// Coordinates and depth of the plane at a place on a disk, with the tolerance for curvature.
+vec3 planeAt(MapPlace at, vec2 onDisk) {
+  vec2 offset = at.squeeze * onDisk;
+  return vec3(at.coord.xy + offset, at.coord.z + dot(at.slope, offset) - ${kCurvature.toFixed(6)} * length(onDisk));
+}
+
 // Part of a disk of the map that does not shade the surface.
-float litPart(sampler2D shadowMap, vec3 coord, vec2 slope, float turn, float radius, int samples) {
+float litPart(sampler2D shadowMap, MapPlace at, float turn, float radius, int samples) {
   float lit = 0.0;
   for (int i = 0; i < samples; ++i) {
-    vec2 offset = radius * diskSample(i, samples, turn);
-    float depth = texture2D(shadowMap, coord.xy + offset).r;
-    lit += step(coord.z + dot(slope, offset) - ${kCurvature.toFixed(6)} * length(offset), depth);
+    vec3 plane = planeAt(at, radius * diskSample(i, samples, turn));
+    lit += step(plane.z, texture2D(shadowMap, plane.xy).r);
   }
   return lit / float(samples);
 }
 
 float softShadow(sampler2D shadowMap, vec3 coord, bool cheap) {
-  // Slope of depth along the surface in map coordinates. It prevents inclined surfaces from shading themselves.
-  vec3 dx = dFdx(coord);
-  vec3 dy = dFdy(coord);
-  float area = dx.x * dy.y - dx.y * dy.x;
-  vec2 slope = vec2(dy.y * dx.z - dx.y * dy.z, dx.x * dy.z - dy.x * dx.z) / (abs(area) > 1e-12 ? area : 1.0);
-  slope *= min(1.0, ${kSteepest.toFixed(6)} / max(length(slope), 1e-6));
-
+  MapPlace at = mapPlaceOf(coord);
   // Interleaved gradient noise rotates the disk per pixel. It turns bands of few samples into noise.
   float turn = 6.2831853 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
-  if (cheap) return litPart(shadowMap, coord, slope, turn, ${(kCheapRadius / kTexels).toFixed(6)}, ${kCheapSamples});
+  if (cheap) return litPart(shadowMap, at, turn, ${(kCheapRadius / kTexels).toFixed(6)}, ${kCheapSamples});
   float blockers = 0.0;
   float blockerDepth = 0.0;
   for (int i = 0; i < ${kSearchSamples}; ++i) {
-    vec2 offset = ${(kUvPerDepth * kSearchDepth).toFixed(6)} * diskSample(i, ${kSearchSamples}, turn);
-    float depth = texture2D(shadowMap, coord.xy + offset).r;
-    if (depth < coord.z + dot(slope, offset) - ${kCurvature.toFixed(6)} * length(offset)) {
+    vec2 onDisk = diskSample(i, ${kSearchSamples}, turn);
+    // Most samples are near the middle: what is near the surface shades it from there only.
+    vec3 plane = planeAt(at, ${(kUvPerDepth * kSearchDepth).toFixed(6)} * length(onDisk) * onDisk);
+    float depth = texture2D(shadowMap, plane.xy).r;
+    if (depth < plane.z) {
       blockers += 1.0;
       blockerDepth += depth;
     }
   }
   if (blockers == 0.0) return 1.0;
   float radius = max(${kUvPerDepth.toFixed(6)} * (coord.z - blockerDepth / blockers), ${(1.5 / kTexels).toFixed(6)});
-  float lit = litPart(shadowMap, coord, slope, turn, radius, ${kFilterSamples});
-  // Few blockers: the shadow fades out, so that pixels whose search finds none do not stand out.
-  return mix(1.0, lit, min(1.0, blockers / 3.0));
+  return litPart(shadowMap, at, turn, radius, ${kFilterSamples});
 }
 `;
 
@@ -82,23 +102,9 @@ export function useSoftShadows(): void {
   const chunk = THREE.ShaderChunk.shadowmap_pars_fragment;
   const at = chunk.lastIndexOf(lookUp);
   if (at < 0 || chunk.split(compared).length !== 2) throw new Error(kUnsupported);
-  offsetBothSides();
   THREE.ShaderChunk.shadowmap_pars_fragment = (chunk.slice(0, at) + kShadowFunction + chunk.slice(at)).replace(
     compared,
     "shadow = softShadow( shadowMap, shadowCoord.xyz, shadowRadius == 0.0 );",
-  );
-}
-
-// Moves the point for which a shadow is looked up towards the light on both sides of a surface. three.js moves it along the
-// normal, so a cloth whose front faces away from the light would shade its lit back.
-function offsetBothSides(): void {
-  const offset = "worldPosition + vec4( shadowWorldNormal * directionalLightShadows[ i ].shadowNormalBias, 0 )";
-  const chunk = THREE.ShaderChunk.shadowmap_vertex;
-  if (!chunk.includes(offset)) throw new Error(kUnsupported);
-  const away = "vec3( directionalShadowMatrix[ i ][ 0 ].z, directionalShadowMatrix[ i ][ 1 ].z, directionalShadowMatrix[ i ][ 2 ].z )";
-  THREE.ShaderChunk.shadowmap_vertex = chunk.replace(
-    "shadowWorldNormal * directionalLightShadows",
-    `faceforward( shadowWorldNormal, ${away}, shadowWorldNormal ) * directionalLightShadows`,
   );
 }
 
@@ -124,6 +130,5 @@ export function sizeSoftShadow(light: THREE.DirectionalLight, radius: number): v
   camera.far = kFar * radius;
   camera.updateProjectionMatrix();
   light.shadow.mapSize.setScalar(kTexels);
-  light.shadow.bias = -0.0005;
-  light.shadow.normalBias = (3 * kWidth * radius) / kTexels;
+  light.shadow.bias = -kBias;
 }
