@@ -12,7 +12,7 @@
 
 namespace clothstream::meshes {
 
-// Such as `mesh "shirt"`, or `mesh 3` if it has no name.
+// Returns a text such as `mesh "shirt"`, or `mesh 3` if the part has no name.
 inline std::string namedPart(std::string_view kind, const std::string& name, std::size_t index) {
   return name.empty() ? fmt::format("{} {}", kind, index) : fmt::format("{} \"{}\"", kind, excerpt(name, 64));
 }

@@ -10,9 +10,10 @@
 
 namespace clothstream::messages {
 
-// Cloth that leaves the range of the stream takes the scene back for everyone, and out of it again as long as
-// what it follows is out there. So what cloth follows may be at most half of the range away from the origin
-// of the scene, along each axis. The other half is for joints relative to their collider, and for the cloth.
+// Largest distance, in m along each axis, of what cloth follows from the origin of the scene: half of the
+// range of the stream. The other half is for joints relative to their collider, and for the cloth. Cloth
+// outside of the range makes the scene go back for everyone, again and again while what it follows stays
+// there.
 float mostFollowedDistance(const model::Scene& scene);
 
 // Whether cloth follows the collider, by its joints or by an attachment.

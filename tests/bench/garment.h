@@ -11,7 +11,7 @@ namespace clothstream::bench {
 void addSurfaces(vulkan::Device& device, const Settings& settings, const RowSink& add);
 // One and ten dressed figures.
 void addFigures(vulkan::Device& device, const Settings& settings, const RowSink& add);
-// What limits, gas and surfaces add to a tick, and their price.
+// Compares the time that limits, gas and surfaces add to a tick with their price.
 void addPrices(vulkan::Device& device, const Settings& settings, const RowSink& add);
 
 }  // namespace clothstream::bench

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view kEllipsis = "\u2026";
 
-// Of a label over a head, in texels.
+// Sizes of a label over a head, in texels.
 constexpr float kLabelPixels = 40;
 constexpr std::uint32_t kLabelHeight = 72, kLabelPadding = 26, kLabelMost = 640;
 
