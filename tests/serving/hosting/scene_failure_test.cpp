@@ -76,7 +76,8 @@ TEST_F(SceneFailureTest, FailedPausedFrameEndsAtItsScene) {
 
 TEST_F(SceneFailureTest, FailedBatchEndsAtItsScenes) {
 #ifdef __SANITIZE_THREAD__
-  GTEST_SKIP() << "ticks take longer than a period with the thread sanitizer, and so begin alone, in no batch";
+  GTEST_SKIP()
+      << "ticks take longer than a period with the thread sanitizer, and so begin alone, in no batch";
 #endif
   // The pause after an error is longer than a period of these scenes, so that both are due after it. With one
   // substep, their ticks are short on a slow device, too: long ones begin alone.
